@@ -23,14 +23,15 @@ pub fn show(found: &Explanation) -> String {
     if found.stops.is_empty() && found.cycles == 0 {
         page.push_str("NO CYCLES: the controller never ran a cycle\n");
     } else if found.stops.is_empty() {
-        let end = if found.ended_in_order {
-            "the controller was ended in order"
+        let (what, end) = if found.ended_in_order {
+            ("NOT STOPPED", "the controller was ended in order")
         } else {
-            "the recording ends while the controller runs"
+            let end = "the recording ends while the controller runs, so a stop may be missing";
+            ("NO STOP RECORDED", end)
         };
         let _ = writeln!(
             page,
-            "NOT STOPPED: {} cycles in {:.3} s; {end}\n",
+            "{what}: {} cycles in {:.3} s; {end}\n",
             found.cycles, found.duration_s
         );
         let _ = writeln!(page, "Smallest margins:\n{}", margins(&found.margins));

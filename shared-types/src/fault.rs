@@ -41,7 +41,7 @@ fault_codes! {
     GuardianLost = 3:
         "the guardian that stops the arm when the controller dies is silent, or the arm does not answer it; look into its log, restart it, then run the command again";
     DeadManReleased = 4:
-        "the operator let go of the dead-man switch while the arm moved; hold it, then run the command again";
+        "the dead-man switch was let go, or is not held (standard input has ended); hold it, then run the command again";
     Disarmed = 5:
         "the arming was withdrawn while the arm moved; arm again by running the command again";
     SetpointNotFinite = 10:
@@ -65,7 +65,7 @@ fault_codes! {
     LinkLost = 22:
         "the connection to the arm was lost; check power and cable, then run the command again";
     ReportStale = 23:
-        "joint reports stopped coming; check the arm's report ports, then run the command again";
+        "no joint reports come, or no longer; check the arm's report ports, then run the command again";
     TrackingError = 24:
         "the arm is not where it was told to be; look for an obstacle, then run the command again";
     LateCycles = 25:

@@ -147,13 +147,13 @@ fn a_motion_faster_than_it_is_armed_for_is_refused_before_it_begins() {
 /// A setpoint 0.2 ms late looks 5 % too fast, so the arm's limit is above that of the plans.
 #[test]
 fn the_arms_own_speed_limit_has_headroom_or_is_set() {
-    for (configured_m_s, on_difference, factor) in [
-        (1.0, OnDifference::Refuse, 1.2),
-        // Left as it is, with a warning.
-        (1.2, OnDifference::Refuse, 1.2),
-        (1.0, OnDifference::Set, 1.2),
-        (0.7, OnDifference::Set, 0.77),
-        (1.2, OnDifference::Set, 1.32),
+    for (configured_m_s, on_difference, factor, warns) in [
+        (1.0, OnDifference::Refuse, 1.2, false),
+        // Left as it is.
+        (1.2, OnDifference::Refuse, 1.2, true),
+        (1.0, OnDifference::Set, 1.2, false),
+        (0.7, OnDifference::Set, 0.77, false),
+        (1.2, OnDifference::Set, 1.32, false),
     ] {
         let mut stand = Stand::with("headroom", ArmConfig::default(), |config| {
             let mut spec = LimitsSpec::from(Limits::default());
@@ -169,6 +169,13 @@ fn the_arms_own_speed_limit_has_headroom_or_is_set() {
             other => panic!("{other:?}"),
         };
         assert!((found - factor).abs() < 1e-3, "{configured_m_s}: {found}");
+        match stand.ask(&ControllerRequest::Status) {
+            ControllerEvent::Status { warnings, .. } => {
+                let warned = warnings.iter().any(|w| w.contains("C60"));
+                assert_eq!(warned, warns, "{warnings:?}");
+            }
+            other => panic!("{other:?}"),
+        }
         stand.finish();
     }
 }

@@ -74,6 +74,8 @@ pub struct Bridge {
     settings: ControlSettings,
     commander: Option<CommanderLock>,
     warnings: Vec<String>,
+    /// What the operator should know of the arm, by its newest bring-up.
+    arm_warnings: Vec<String>,
     ports: BridgePorts<TcpLink>,
     server: RpcServer<ControllerRpc>,
     cycles: CyclePublisher,
@@ -121,6 +123,7 @@ impl Bridge {
             settings,
             commander: None,
             warnings,
+            arm_warnings: Vec::new(),
             ports,
             server: RpcServer::open(bus)?,
             cycles: bus.cycle_publisher()?,

@@ -102,7 +102,7 @@ impl Bridge {
                 arm_error: self.arm_error.0,
                 q_c: self.newest.q_c,
                 operating_mode: self.operating_mode,
-                warnings: self.warnings.clone(),
+                warnings: [&self.warnings[..], &self.arm_warnings].concat(),
             },
         );
     }
@@ -182,15 +182,18 @@ impl Bridge {
             };
             answer(call, &step);
         };
-        ArmSession::connect(command, SET_UP_TIMEOUT)
+        let prepared = ArmSession::connect(command, SET_UP_TIMEOUT)
             .map_err(SetUpError::from)
             .and_then(|mut session| {
-                let q = plan.run(&mut session, &mut step_done)?;
+                let (q, warnings) = plan.run(&mut session, &mut step_done)?;
                 let link = TcpLink::connect(command, SET_UP_TIMEOUT, link);
                 let link = link.map_err(|reason| SessionError::Connect(command, reason))?;
-                Ok((q, Box::new(link)))
+                Ok((q, Box::new(link), warnings))
             })
-            .map_err(|error| (error.fault, error.to_string()))
+            .map_err(|error| (error.fault, error.to_string()));
+        let (q, link, warnings) = prepared?;
+        self.arm_warnings = warnings;
+        Ok((q, link))
     }
 
     /// Whether a motion may be asked for; refuses the call otherwise.

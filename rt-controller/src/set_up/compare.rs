@@ -10,6 +10,7 @@ use crate::xarm::{Command, Firmware, Mode, ReplyData, TcpPose};
 use arm_model::JOINTS;
 use arm_model::limits::TOOL_SPEED_RATED_M_S;
 use shared_types::FaultCode;
+use std::fmt;
 use std::time::{Duration, Instant};
 
 /// The arm checks tool speed against this times its factor (m/s).
@@ -29,7 +30,113 @@ const OFFSET_EQUAL_M: f64 = 1e-4;
 /// Status reports lag by so much at most; also the time between two looks at them.
 const REPORT_LAG: Duration = Duration::from_millis(200);
 /// What to do about a difference that is refused.
-const SET_ONE: &str = "set one to the other (`on_difference = \"set\"` sets the arm)";
+const SET_ONE: &str =
+    "set one to the other (`on_difference = \"set\"` in rt-controller.toml sets the arm)";
+
+/// How the arm's own tool speed limit fits that of the plans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Headroom {
+    /// Setpoints may come a little late.
+    Enough,
+    /// Jitter may stop a throw that keeps its limit.
+    Little,
+    /// It stops throws that keep their limit, or guards nothing.
+    Unfit,
+}
+
+/// The arm's own tool speed limit (C60), and that of the plans.
+#[derive(Debug, Clone, Copy)]
+pub struct ToolSpeed {
+    arm_m_s: f64,
+    plans_m_s: f64,
+    /// Whether the firmware lets it be set.
+    is_settable: bool,
+}
+
+impl ToolSpeed {
+    /// Asks an arm of this firmware; plans keep `plans_m_s`.
+    pub fn read(
+        session: &mut ArmSession,
+        firmware: Firmware,
+        plans_m_s: f64,
+    ) -> Result<Self, SessionError> {
+        let is_settable = firmware >= Firmware::SPEED_FACTOR;
+        let factor = if is_settable {
+            match session.ask(&Command::GetSpeedLimitFactor)? {
+                ReplyData::SpeedLimitFactor(factor) => factor,
+                _ => f64::NAN,
+            }
+        } else {
+            1.0
+        };
+        Ok(Self {
+            arm_m_s: factor * SPEED_AT_FACTOR_ONE_M_S,
+            plans_m_s,
+            is_settable,
+        })
+    }
+
+    fn most_m_s(&self) -> f64 {
+        if self.is_settable {
+            within_rating(HEADROOM_MAX * self.plans_m_s)
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// How both fit.
+    #[must_use]
+    pub fn headroom(&self) -> Headroom {
+        let has = |headroom: f64| {
+            let least_m_s = within_rating(headroom * self.plans_m_s);
+            let (low, high) = (
+                least_m_s - SPEED_EQUAL_M_S,
+                self.most_m_s() + SPEED_EQUAL_M_S,
+            );
+            (low..=high).contains(&self.arm_m_s)
+        };
+        if has(HEADROOM_FOR_JITTER) {
+            Headroom::Enough
+        } else if has(1.0) {
+            Headroom::Little
+        } else {
+            Headroom::Unfit
+        }
+    }
+
+    /// What is wrong, and what to do.
+    #[must_use]
+    pub fn remedy(&self) -> String {
+        let (plans_m_s, set_m_s) = (self.plans_m_s, within_rating(HEADROOM_SET * self.plans_m_s));
+        match self.headroom() {
+            Headroom::Enough => String::new(),
+            Headroom::Little => format!(
+                "the arm stops with C60 at {self}: a setpoint that is a little late may stop a throw; set {set_m_s:.3} m/s in the arm, or lower `tcp_speed_max_m_s`"
+            ),
+            Headroom::Unfit if self.is_settable => format!(
+                "the arm limits the tool's speed to {:.3} m/s, which must be {plans_m_s:.3} to {:.3} m/s for plans that keep {plans_m_s:.3} m/s: {SET_ONE}",
+                self.arm_m_s,
+                self.most_m_s()
+            ),
+            Headroom::Unfit => format!(
+                "this firmware limits the tool's speed to {:.3} m/s for good, the limits say {plans_m_s:.3} m/s: lower `tcp_speed_max_m_s`",
+                self.arm_m_s
+            ),
+        }
+    }
+}
+
+impl fmt::Display for ToolSpeed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (arm_m_s, plans_m_s) = (self.arm_m_s, self.plans_m_s);
+        write!(f, "{arm_m_s:.3} m/s, plans keep {plans_m_s:.3} m/s")
+    }
+}
+
+/// A tool speed, the arm's rating at most (m/s).
+fn within_rating(speed_m_s: f64) -> f64 {
+    TOOL_SPEED_RATED_M_S.min(speed_m_s)
+}
 
 impl SetUp<'_> {
     pub(super) fn match_tool(&self, session: &mut ArmSession) -> Result<String, SetUpError> {
@@ -56,39 +163,26 @@ impl SetUp<'_> {
         }
     }
 
+    /// The arm's own tool speed limit beside that of the plans; a warning is added where it is
+    /// too close.
     pub(super) fn match_tool_speed(
         &self,
         session: &mut ArmSession,
         firmware: Firmware,
+        warnings: &mut Vec<String>,
     ) -> Result<String, SetUpError> {
-        let configured_m_s = self.limits.tcp_speed_max_m_s;
-        let settable = firmware >= Firmware::SPEED_FACTOR;
-        let read_m_s = |session: &mut ArmSession| -> Result<f64, SessionError> {
-            if !settable {
-                return Ok(SPEED_AT_FACTOR_ONE_M_S);
-            }
-            let factor = match session.ask(&Command::GetSpeedLimitFactor)? {
-                ReplyData::SpeedLimitFactor(factor) => factor,
-                _ => f64::NAN,
-            };
-            Ok(factor * SPEED_AT_FACTOR_ONE_M_S)
-        };
-        let arm_m_s = read_m_s(session)?;
-        let with = |headroom: f64| TOOL_SPEED_RATED_M_S.min(headroom * configured_m_s);
-        let (set_m_s, most_m_s) = (with(HEADROOM_SET), with(HEADROOM_MAX));
-        let has = |headroom: f64| {
-            let most_m_s = if settable { most_m_s } else { f64::INFINITY };
-            (with(headroom) - SPEED_EQUAL_M_S..=most_m_s + SPEED_EQUAL_M_S).contains(&arm_m_s)
-        };
-        let both = format!("{arm_m_s:.3} m/s, plans keep {configured_m_s:.3} m/s");
-        if has(HEADROOM_FOR_JITTER) {
-            return Ok(both);
+        let plans_m_s = self.limits.tcp_speed_max_m_s;
+        let found = ToolSpeed::read(session, firmware, plans_m_s)?;
+        let headroom = found.headroom();
+        if headroom == Headroom::Enough {
+            return Ok(found.to_string());
         }
-        if self.config.on_difference == OnDifference::Set && settable {
+        let set_m_s = within_rating(HEADROOM_SET * plans_m_s);
+        if self.config.on_difference == OnDifference::Set && found.is_settable {
             session.ask(&Command::SetSpeedLimitFactor(
                 set_m_s / SPEED_AT_FACTOR_ONE_M_S,
             ))?;
-            let read_back_m_s = read_m_s(session)?;
+            let read_back_m_s = ToolSpeed::read(session, firmware, plans_m_s)?.arm_m_s;
             let is_set = (read_back_m_s - set_m_s).abs() <= SPEED_EQUAL_M_S;
             if !is_set {
                 let message = format!(
@@ -96,25 +190,13 @@ impl SetUp<'_> {
                 );
                 return refuse(FaultCode::ArmDiffers, message);
             }
-            return Ok(format!("{both}: set to {set_m_s:.3} m/s"));
+            return Ok(format!("{found}: set to {set_m_s:.3} m/s"));
         }
-        if has(1.0) {
-            tracing::warn!(
-                "the arm stops with C60 at {both}: a setpoint a little late may stop a throw; \
-                 set a limit of {set_m_s:.3} m/s in the arm, or lower `tcp_speed_max_m_s`"
-            );
-            return Ok(format!("{both}, too close to allow for jitter"));
+        if headroom == Headroom::Unfit {
+            return refuse(FaultCode::ArmDiffers, found.remedy());
         }
-        let message = if settable {
-            format!(
-                "the arm limits the tool's speed to {arm_m_s:.3} m/s, which must be {configured_m_s:.3} to {most_m_s:.3} m/s for plans that keep {configured_m_s:.3} m/s: {SET_ONE}"
-            )
-        } else {
-            format!(
-                "this firmware limits the tool's speed to {arm_m_s:.3} m/s for good, the limits say {configured_m_s:.3} m/s: lower `tcp_speed_max_m_s`"
-            )
-        };
-        refuse(FaultCode::ArmDiffers, message)
+        warnings.push(found.remedy());
+        Ok(found.to_string())
     }
 
     /// Compares what decides how the arm moves and when it stops by itself. Nothing is set

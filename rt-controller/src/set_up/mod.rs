@@ -10,6 +10,7 @@
 mod compare;
 mod reports;
 
+pub use compare::{Headroom, ToolSpeed};
 pub use reports::read_status;
 
 use crate::config::ControllerConfig;
@@ -61,7 +62,8 @@ pub struct SetUp<'a> {
 pub type OnStep<'a> = &'a mut dyn FnMut(&'static str, &str);
 
 impl SetUp<'_> {
-    /// Sets up the arm behind `session`; each step is `reported`. Where it stands (rad).
+    /// Sets up the arm behind `session`; each step is `reported`. Where it stands (rad), and
+    /// what the operator should know.
     ///
     /// # Errors
     /// [`SetUpError`]; the step that failed was not reported.
@@ -69,7 +71,8 @@ impl SetUp<'_> {
         &self,
         session: &mut ArmSession,
         reported: OnStep<'_>,
-    ) -> Result<JointVector, SetUpError> {
+    ) -> Result<(JointVector, Vec<String>), SetUpError> {
+        let mut warnings = Vec::new();
         let version = self.identify(session)?;
         reported(
             "identify",
@@ -80,7 +83,7 @@ impl SetUp<'_> {
         reported("tool", &self.match_tool(session)?);
         reported(
             "tool speed",
-            &self.match_tool_speed(session, version.firmware)?,
+            &self.match_tool_speed(session, version.firmware, &mut warnings)?,
         );
         reported("settings", &self.match_settings(session)?);
         self.read_settings_back()?;
@@ -90,7 +93,7 @@ impl SetUp<'_> {
             // Nobody watches an arm that was refused: it must not stay ready.
             let _ = session.stop_arm();
         }
-        enabled
+        enabled.map(|q| (q, warnings))
     }
 
     /// Enables the arm, which is set as it must be, until it stands ready in its mode.

@@ -30,7 +30,7 @@ impl SetUp<'_> {
                 format!("{least} to {most}")
             };
             let message = format!(
-                "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check the ports and update the firmware"
+                "the arm says that its firmware is {firmware}, which sends reports of {expected} bytes on port {port}, but they have {found}: check which report port is which, then the firmware"
             );
             refuse(FaultCode::UnsupportedFirmware, message)
         };

@@ -15,14 +15,20 @@ pub fn run(address: Option<IpAddr>, ports: &ArmPorts) -> Outcome<Option<Value>> 
     findings.push(network_finding());
     if let Some(ip) = address {
         let reports = [ports.report_port, ports.status_port];
-        let line = judge_line(ip, ports.command_port, &reports);
-        let answers = line.iter().all(|f| f.verdict != Verdict::Fail);
+        let limits = config::here::<Limits>(None).or_input()?;
+        let plans_m_s = limits.tcp_speed_max_m_s;
+        let (line, is_real) = judge_line(ip, ports.command_port, &reports, plans_m_s);
+        let reports = |f: &Finding| f.name == "report port" && f.verdict != Verdict::Fail;
+        let answers = line.iter().any(reports);
+        if is_real {
+            findings.iter_mut().for_each(Finding::require_of_a_real_arm);
+        }
         findings.extend(line);
         if answers {
             let wanted = config::here::<ControllerConfig>(None)
                 .or_input()?
                 .arm_settings;
-            let tool_m = config::here::<Limits>(None).or_input()?.tcp_offset_m;
+            let tool_m = limits.tcp_offset_m;
             let status = SocketAddr::new(ip, ports.status_port);
             findings.push(settings(status, &wanted, tool_m));
         }

@@ -74,6 +74,11 @@ fn announce(bind: IpAddr, ports: ArmPorts) {
         "simulated xArm 7 at {bind}: commands on {}, reports on {:?}; Ctrl-C ends it",
         ports.command, ports.reports
     );
+    let [joints, _, status, _] = ports.reports;
+    println!(
+        "drive it with --arm {bind} --command-port {} --report-port {joints} --status-port {status}",
+        ports.command
+    );
 }
 
 fn arm_alone(

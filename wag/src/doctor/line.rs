@@ -3,8 +3,8 @@
 use super::{Finding, Verdict};
 use rt_controller::arm_settings::{ArmSettings, summary};
 use rt_controller::session::ArmSession;
-use rt_controller::set_up::read_status;
-use rt_controller::xarm::{ArmVersion, Command, ReplyData};
+use rt_controller::set_up::{Headroom, ToolSpeed, read_status};
+use rt_controller::xarm::{ArmVersion, Command, Firmware, ReplyData};
 use std::io::Read;
 use std::net::{IpAddr, SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
@@ -16,9 +16,15 @@ const WAIT: Duration = Duration::from_secs(2);
 /// Round trips that leave a cycle of 4 ms room: median and p99 (µs).
 const ROUND_TRIP_US: (f64, f64) = (500.0, 2000.0);
 
-/// Asks an arm for its version, again and again, and listens to its report ports.
-/// Nothing is set and nothing moves.
-pub fn judge_line(ip: IpAddr, command_port: u16, report_ports: &[u16]) -> Vec<Finding> {
+/// Asks an arm for its version, again and again, for its tool speed limit beside that of the
+/// plans, and listens to its report ports. Nothing is set and nothing moves. Also whether a
+/// real arm answers.
+pub fn judge_line(
+    ip: IpAddr,
+    command_port: u16,
+    report_ports: &[u16],
+    plans_m_s: f64,
+) -> (Vec<Finding>, bool) {
     let address = SocketAddr::new(ip, command_port);
     let mut round_trips_us = Vec::with_capacity(QUESTIONS);
     let version = ask(address, &mut round_trips_us);
@@ -35,12 +41,32 @@ pub fn judge_line(ip: IpAddr, command_port: u16, report_ports: &[u16]) -> Vec<Fi
         },
         "check power, cable and address (the arm's own page shows it in a browser), and that this machine has an address in its network",
     )];
-    if version.is_ok() {
+    if let Ok((version, _)) = &version {
         let ports = report_ports.iter();
         findings.extend(ports.map(|port| report_port(SocketAddr::new(ip, *port))));
+        findings.push(tool_speed(address, version.firmware, plans_m_s));
     }
     findings.extend(round_trips(&round_trips_us));
-    findings
+    let is_real = version.is_ok_and(|(_, simulated)| !simulated);
+    (findings, is_real)
+}
+
+/// The arm's own tool speed limit beside that of the plans.
+fn tool_speed(address: SocketAddr, firmware: Firmware, plans_m_s: f64) -> Finding {
+    let read = ArmSession::connect(address, WAIT)
+        .and_then(|mut session| ToolSpeed::read(&mut session, firmware, plans_m_s));
+    let (verdict, found, remedy) = match read {
+        Ok(found) => {
+            let verdict = match found.headroom() {
+                Headroom::Enough => Verdict::Pass,
+                Headroom::Little => Verdict::Warn,
+                Headroom::Unfit => Verdict::Fail,
+            };
+            (verdict, found.to_string(), found.remedy())
+        }
+        Err(reason) => (Verdict::Fail, reason.to_string(), String::new()),
+    };
+    Finding::new("tool speed", verdict, found, &remedy)
 }
 
 /// Its version, and whether it is the simulated arm.
@@ -146,6 +172,21 @@ mod tests {
         assert!(found.remedy.contains("1.000 kg"), "{found:?}");
         assert!(found.remedy.contains("self-collision"), "{found:?}");
         assert_eq!(settings(at(9), &any, [0.0; 3]).verdict, Verdict::Fail);
+        // Its tool speed limit is 1.2 m/s.
+        for (plans_m_s, verdict) in [
+            (1.0, Verdict::Pass),
+            (1.2, Verdict::Warn),
+            (1.3, Verdict::Fail),
+            (0.7, Verdict::Fail),
+        ] {
+            let found = tool_speed(at(arm.ports().command), Firmware::new(2, 7, 1), plans_m_s);
+            assert_eq!(found.verdict, verdict, "{found:?}");
+            assert_eq!(
+                found.remedy.is_empty(),
+                verdict == Verdict::Pass,
+                "{found:?}"
+            );
+        }
     }
 
     #[test]
@@ -160,11 +201,9 @@ mod tests {
         assert!(slow.found.contains("max 190000 µs"), "{}", slow.found);
         // Port 9 of this machine: nobody is there.
         let here = [127, 0, 0, 1].into();
-        let found = [
-            judge_line(here, 9, &[9]),
-            vec![report_port((here, 9).into())],
-        ]
-        .concat();
+        let (nobody, is_real) = judge_line(here, 9, &[9], 1.2);
+        assert!(!is_real);
+        let found = [nobody, vec![report_port((here, 9).into())]].concat();
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(found.iter().all(|f| f.verdict == Verdict::Fail));
         assert!(found[0].found.starts_with("127.0.0.1:9: "), "{found:?}");

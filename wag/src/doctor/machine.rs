@@ -1,7 +1,7 @@
 //! What a machine's system says about itself in `/proc`, `/sys` and `/dev`, and what that
 //! means for a throw.
 
-use super::{Finding, Verdict};
+use super::{Finding, REQUIRED_OF_A_REAL_ARM, Verdict};
 use rope_sim::{Kernel, Precision};
 use std::path::Path;
 
@@ -86,7 +86,7 @@ impl Machine<'_> {
                 "install your distribution's PREEMPT_RT kernel; without it rare delays of milliseconds are to be expected",
             ),
             Finding::new(
-                "real-time priority",
+                REQUIRED_OF_A_REAL_ARM[0],
                 Verdict::warn_unless(priority_max >= PRIORITY),
                 match priority_max {
                     u64::MAX => "any".to_owned(),
@@ -96,7 +96,7 @@ impl Machine<'_> {
                 "put `@wag - rtprio 95` into /etc/security/limits.d/wag.conf (packaging/limits.d), join the group, log in again",
             ),
             Finding::new(
-                "memory lock",
+                REQUIRED_OF_A_REAL_ARM[1],
                 Verdict::warn_unless(lock_max_bytes >= LOCKED_BYTES),
                 match lock_max_bytes {
                     u64::MAX => "unlimited".to_owned(),

@@ -47,7 +47,17 @@ pub struct Finding {
     pub remedy: String,
 }
 
+/// What the controller does not drive a real arm without.
+const REQUIRED_OF_A_REAL_ARM: [&str; 2] = ["real-time priority", "memory lock"];
+
 impl Finding {
+    /// With a real arm, what the controller requires is no warning any more.
+    pub fn require_of_a_real_arm(&mut self) {
+        if self.verdict == Verdict::Warn && REQUIRED_OF_A_REAL_ARM.contains(&self.name) {
+            self.verdict = Verdict::Fail;
+        }
+    }
+
     /// What was found, with the remedy for what is not as it should be.
     pub fn new(name: &'static str, verdict: Verdict, found: String, remedy: &str) -> Self {
         let remedy = match verdict {
