@@ -18,6 +18,7 @@ fn requested() -> Vec<Command> {
         Command::GetState,
         Command::Buffered,
         Command::GetFault,
+        Command::DigitalInputs,
         Command::GetSpeedLimitFactor,
         Command::JointPosition(JointQuery::MEASURED),
         Command::SetState(StateRequest::Ready),

@@ -5,7 +5,7 @@
 #[path = "recording/random_run.rs"]
 mod random_run;
 
-use random_run::{record_run, record_run_with};
+use random_run::{record_measured_run, record_run, record_run_with};
 use rt_controller::recording::{Item, LogReader, Read, RecordedCycle, replay};
 use std::collections::BTreeSet;
 
@@ -100,6 +100,18 @@ fn a_replay_begins_at_any_cycle_and_after_any_loss() {
     assert!(found.gaps[0].reason.contains("100 cycle(s)"), "{found:?}");
     assert_eq!(found.gaps[0].after_cycle, Some(999));
     assert_eq!(found.cycles + found.skipped, 3900);
+}
+
+/// What is predicted is part of the state: a replay from any keyframe has it.
+#[test]
+fn a_run_of_a_measured_arm_replays_to_the_bit_from_anywhere() {
+    for seed in [2, 3] {
+        let run = record_measured_run(seed, 4000);
+        for from in [1, 1300, 3999] {
+            let found = replay(&run, from).unwrap();
+            assert!(found.is_exact() && found.gaps.is_empty(), "{found:?}");
+        }
+    }
 }
 
 #[test]

@@ -36,6 +36,8 @@ pub struct ArmConfig {
     pub initial_q: JointVector,
     /// Step of the joint encoders (rad).
     pub encoder_resolution_rad: f64,
+    /// Standard deviation of the positions that the encoders tell (rad).
+    pub encoder_noise_rad: f64,
     /// Linear speed limit in servo mode at the start, as a factor of 1 m/s.
     pub speed_limit_factor: f64,
     /// Firmware: sizes of reports, what is known to the command port.
@@ -57,6 +59,8 @@ pub struct ArmConfig {
     /// Safety boundary at the start, as register 52 holds it: x+, x-, y+, y-, z+, z-
     /// (mm); none if it is switched off.
     pub fence_mm: Option<[i32; 6]>,
+    /// Levels of the control box's digital inputs, bit `i` of input `i`; open ones are high.
+    pub digital_inputs: u16,
     /// Faults to inject.
     pub faults: FaultScript,
 }
@@ -73,6 +77,7 @@ impl Default for ArmConfig {
             limits: Limits::default(),
             initial_q: JointVector::ZERO,
             encoder_resolution_rad: 1e-5,
+            encoder_noise_rad: 0.0,
             speed_limit_factor: 1.2,
             firmware: Firmware::default(),
             joint_lags: None,
@@ -83,6 +88,7 @@ impl Default for ArmConfig {
             obstacles: Vec::new(),
             self_collision_check: false,
             fence_mm: None,
+            digital_inputs: u16::MAX,
             faults: FaultScript::default(),
         }
     }
@@ -117,6 +123,9 @@ impl ArmConfig {
         }
         if !(self.encoder_resolution_rad > 0.0 && self.encoder_resolution_rad < 0.1) {
             return refuse("encoder_resolution_rad", "must lie between 0 and 0.1 rad");
+        }
+        if !(0.0..0.1).contains(&self.encoder_noise_rad) {
+            return refuse("encoder_noise_rad", "must be at least 0 and below 0.1 rad");
         }
         if !(self.speed_limit_factor > 0.0 && self.speed_limit_factor.is_finite()) {
             return refuse("speed_limit_factor", "must be above 0");

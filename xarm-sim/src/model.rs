@@ -17,6 +17,8 @@ use super::reference::{Move, Reference, Task};
 use super::servo::ServoStream;
 use super::setpoint_check::SetpointLimits;
 use arm_model::{JOINTS, JointState, JointVector, Limits};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use rt_controller::xarm::{
     ArmState, Command, CommandError, ErrorCode, Mode, Register, ReplyData, Status, TcpPose,
 };
@@ -211,12 +213,24 @@ impl ArmModel {
         }
     }
 
-    /// Joint motion as the encoders tell it: positions in encoder steps.
+    /// Joint motion as the encoders tell it: positions in encoder steps, with their noise.
     #[must_use]
     pub fn measured_motion(&self) -> JointState {
-        let step = self.config.encoder_resolution_rad;
+        let (step, noise) = (
+            self.config.encoder_resolution_rad,
+            self.config.encoder_noise_rad,
+        );
         let truth = self.true_motion();
-        let seen = truth.q + self.encoder_offset;
+        let mut seen = truth.q + self.encoder_offset;
+        if noise > 0.0 {
+            // The same whoever asks at this time.
+            let mut rng = ChaCha8Rng::seed_from_u64(self.config.seed ^ self.time.0);
+            for j in 0..JOINTS {
+                // Twelve uniform parts are as good as a normal one of variance 1.
+                let normal: f64 = (0..12).map(|_| rng.random::<f64>()).sum();
+                seen[j] += noise * (normal - 6.0);
+            }
+        }
         JointState {
             q: seen.map(|q| (q / step).round() * step),
             ..truth

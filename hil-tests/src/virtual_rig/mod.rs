@@ -26,6 +26,7 @@ pub use surroundings::Surroundings;
 use crate::scenario;
 use arm_model::joint::START_POSE;
 use arm_model::{JointVector, Limits};
+use rt_controller::control::monitor::prediction::MeasuredLags;
 use rt_controller::control::{ControlCommand, ControlEvent, ControlSettings, ControlState, Motion};
 use rt_controller::driver::{CommandMsg, CycleDriver};
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
@@ -53,11 +54,17 @@ pub struct VirtualRigConfig {
     pub settings: ControlSettings,
     /// The arm, with its fault script.
     pub arm: ArmConfig,
+    /// What was measured of the arm's joints.
+    pub lags: MeasuredLags,
     /// Time a byte takes between the two, each way (s).
     pub delay_s: f64,
 }
 
 impl VirtualRigConfig {
+    fn control(&self) -> ControlState {
+        ControlState::new(self.limits.clone(), self.settings).measured(&self.lags)
+    }
+
     /// The arm in its start pose on a good cable, with faults to come.
     #[must_use]
     pub fn new(settings: ControlSettings, faults: FaultScript) -> Self {
@@ -69,6 +76,7 @@ impl VirtualRigConfig {
                 faults,
                 ..ArmConfig::default()
             },
+            lags: MeasuredLags::default(),
             delay_s: 0.0002,
         }
     }
@@ -141,9 +149,8 @@ impl VirtualRig {
     #[must_use]
     pub fn new(config: VirtualRigConfig) -> Self {
         let arm = ArmEndpoint::new(config.arm.clone(), START);
-        let control = ControlState::new(config.limits.clone(), config.settings);
         Self {
-            driver: CycleDriver::new(control, START.0),
+            driver: CycleDriver::new(config.control(), START.0),
             around: Surroundings::new(arm, START, config.delay_s),
             late_ns: VecDeque::new(),
             motions: 0,
@@ -221,9 +228,8 @@ impl VirtualRig {
     /// The controller's process dies, its connections with it; the arm is alone
     /// for `span_s`. Then a new process begins its cycles, knowing nothing.
     pub fn kill_controller(&mut self, span_s: f64) {
-        let control = ControlState::new(self.config.limits.clone(), self.config.settings);
         let until = self.now().plus_s(span_s);
-        self.driver = CycleDriver::new(control, until.0);
+        self.driver = CycleDriver::new(self.config.control(), until.0);
         self.around.forget();
         self.around.advance_to(until);
     }

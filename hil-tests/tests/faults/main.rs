@@ -11,6 +11,7 @@ mod judge;
 mod limits;
 mod link;
 mod machine;
+mod measured_lag;
 mod operator;
 mod plan;
 mod processes;

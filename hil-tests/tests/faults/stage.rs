@@ -89,11 +89,19 @@ impl Stage {
 
     /// The same of another set-up.
     pub(crate) fn of(config: VirtualRigConfig) -> Self {
+        Self::throwing_from(config, fast_throw)
+    }
+
+    /// The same with the throw that it is given for the pose in which the arm is held.
+    pub(crate) fn throwing_from(
+        config: VirtualRigConfig,
+        throw: impl FnOnce(JointVector) -> JointTrajectory,
+    ) -> Self {
         let via = config.settings.interface;
         let mut rig = VirtualRig::new(config);
         rig.bring_up().unwrap();
         rig.run_for(0.5);
-        let throw = fast_throw(rig.commanded());
+        let throw = throw(rig.commanded());
         Self { rig, via, throw }
     }
 

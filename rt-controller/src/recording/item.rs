@@ -17,7 +17,7 @@ pub struct RecordedCycle {
 }
 
 /// Longest snapshot (bytes).
-pub(super) const SNAPSHOT_MAX: usize = 12 * 1024;
+pub(super) const SNAPSHOT_MAX: usize = 16 * 1024;
 
 /// The core's state before a cycle as bytes, the running motion only named.
 /// Fixed size, for a ring; RT-safe to copy.

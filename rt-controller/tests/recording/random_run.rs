@@ -9,9 +9,10 @@
 )]
 
 use arm_model::joint::START_POSE;
-use arm_model::{JointTrajectory, JointVector, Limits};
+use arm_model::{JOINTS, JointTrajectory, JointVector, Limits};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rt_controller::control::monitor::prediction::MeasuredLag;
 use rt_controller::control::record::record_input;
 use rt_controller::control::{
     ArmCodes, ControlCommand, ControlEvent, ControlState, CycleInput, Motion, Thresholds,
@@ -34,9 +35,32 @@ pub(crate) fn record_run(seed: u64, cycles: u64) -> Vec<u8> {
     record_run_with(seed, cycles, 0..0, |_| ())
 }
 
+/// The same of an arm that was measured but for its last joint.
+pub(crate) fn record_measured_run(seed: u64, cycles: u64) -> Vec<u8> {
+    let mut lags = [Some(MeasuredLag {
+        dead_time_s: 0.001 * LAG as f64 * 4.0,
+        natural_frequency_rad_s: 2000.0,
+        damping_ratio: 1.0,
+    }); JOINTS];
+    lags[6] = None;
+    let control = ControlState::new(Limits::default(), Thresholds::strict());
+    record(control.measured(&lags), seed, cycles, 0..0, |_| ())
+}
+
 /// A run of which the cycles `lost` are not recorded and every other is changed by
 /// `change`.
 pub(crate) fn record_run_with(
+    seed: u64,
+    cycles: u64,
+    lost: Range<u64>,
+    change: impl FnMut(&mut RecordedCycle),
+) -> Vec<u8> {
+    let control = ControlState::new(Limits::default(), Thresholds::strict());
+    record(control, seed, cycles, lost, change)
+}
+
+fn record(
+    mut control: ControlState,
     seed: u64,
     cycles: u64,
     lost: Range<u64>,
@@ -44,7 +68,6 @@ pub(crate) fn record_run_with(
 ) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut writer = ChunkWriter::default();
-    let mut control = ControlState::new(Limits::default(), Thresholds::strict());
     let mut world = World::new(seed);
     for cycle in 1..=cycles {
         if cycle % KEYFRAME_EVERY == 1 {

@@ -8,7 +8,7 @@ mod response;
 use arm_model::{JointTrajectory, Limits};
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
 use rt_controller::control::{ControlSettings, Motion};
-use xarm_sim::{ArmConfig, ArmEvent};
+use xarm_sim::{ArmConfig, ArmEvent, FaultScript};
 
 /// Runs longer checks.
 fn long_tests() -> bool {
@@ -29,7 +29,7 @@ fn run(
             initial_q: plan.start(),
             ..arm
         },
-        delay_s: 0.0002,
+        ..VirtualRigConfig::new(settings, FaultScript::default())
     });
     rig.bring_up().unwrap();
     // The encoders tell the start in steps of 10 µrad.

@@ -208,6 +208,7 @@ impl ArmModel {
                 error: self.error.0,
                 warning: self.warning,
             },
+            Command::DigitalInputs => ReplyData::DigitalInputs(self.config.digital_inputs),
             Command::TcpPose => ReplyData::Pose(self.tcp_pose(&self.measured_motion().q)),
             Command::JointPosition(JointQuery::Commanded) => ReplyData::Joints(self.reference.q),
             Command::JointPosition(JointQuery::Quantities {

@@ -15,7 +15,7 @@ use shared_types::{Arming, FaultCode, MonotonicNs, OperatingMode};
 
 /// Starts closer than this are equal (rad); a larger difference would be a jump.
 const START_TOLERANCE_RAD: f64 = 1e-9;
-/// The arm may stand this far from where it was commanded to be when a motion begins
+/// The arm may stand this far from where it was commanded or predicted to be when a motion begins
 /// (rad): half a degree.
 const START_DEVIATION_MAX_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 

@@ -7,6 +7,7 @@ use super::exchange::{ArmCommand, ControlEvent, CycleInput, CycleOutput};
 use super::limiter::{Allowance, Limiter};
 use super::mode::{ModeState, Trigger, next_mode};
 use super::monitor::Monitor;
+use super::monitor::prediction::{MeasuredLags, Prediction};
 use super::motion::Motion;
 use super::reaction::{StopCategory, reaction};
 use super::settings::ControlSettings;
@@ -60,6 +61,27 @@ impl ControlState {
             velocity: VelocityInterface::default(),
             monitor: Monitor::new(settings, 0, q),
         }
+    }
+
+    /// The same for an arm whose joints follow setpoints as measured: where they are is compared
+    /// with where they should be by then. Joint velocities move the arm otherwise: by them
+    /// nothing is predicted.
+    #[must_use]
+    pub fn measured(mut self, lags: &MeasuredLags) -> Self {
+        let known = lags.iter().any(Option::is_some)
+            && self.settings.interface == CommandInterface::ServoPosition;
+        self.monitor.reports.prediction = known.then(|| Prediction::new(lags));
+        self
+    }
+
+    /// The same for the arm of another controller.
+    #[must_use]
+    pub fn measured_as(mut self, other: &Self) -> Self {
+        self.monitor
+            .reports
+            .prediction
+            .clone_from(&other.monitor.reports.prediction);
+        self
     }
 
     /// Present mode.

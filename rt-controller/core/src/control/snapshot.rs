@@ -36,9 +36,12 @@ impl ControlState {
     #[must_use]
     pub fn write_to(&self, bytes: &mut [u8]) -> Option<usize> {
         let named = self.state.try_map(|_, motion| Some(motion.fingerprint()))?;
-        postcard::to_slice(&(named, self), bytes)
-            .ok()
-            .map(|written| written.len())
+        let written = postcard::to_slice(&(named, self), bytes).ok()?.len();
+        let Some(prediction) = &self.monitor.reports.prediction else {
+            return Some(written);
+        };
+        let behind = postcard::to_slice(prediction, bytes.get_mut(written..)?).ok()?;
+        Some(written.saturating_add(behind.len()))
     }
 
     /// The state that [`ControlState::write_to`] wrote; `motion_of` finds the
@@ -50,8 +53,13 @@ impl ControlState {
     ) -> Option<Self> {
         let ((named, mut state), rest) =
             postcard::take_from_bytes::<(ModeState<u64>, Self)>(bytes).ok()?;
+        // The states of arms that were not measured, and those before there were any, end here.
         if !rest.is_empty() {
-            return None;
+            let (prediction, rest) = postcard::take_from_bytes(rest).ok()?;
+            if !rest.is_empty() {
+                return None;
+            }
+            state.monitor.reports.prediction = Some(prediction);
         }
         state.state = named.try_map(|id, hash| motion_of(id, *hash))?;
         Some(state)

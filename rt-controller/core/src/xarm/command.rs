@@ -146,6 +146,8 @@ pub enum Command {
     JointPosition(JointQuery),
     /// Asks for the TCP pose at joint angles (rad).
     ForwardKinematics(JointVector),
+    /// Asks for the digital inputs of the control box.
+    DigitalInputs,
     /// Asks whether joint angles (rad) are outside the range.
     JointLimitTest(JointVector),
     /// Joint velocity (mode 4).
@@ -200,6 +202,7 @@ impl Command {
             Self::ForwardKinematics(_) => Register::ForwardKinematics,
             Self::JointLimitTest(_) => Register::JointLimitTest,
             Self::JointVelocity { .. } => Register::JointVelocity,
+            Self::DigitalInputs => Register::DigitalInputs,
             Self::SetSpeedLimitFactor(_) => Register::SetParameter,
             Self::GetSpeedLimitFactor => Register::GetParameter,
             Self::FeedbackCheck => Register::FeedbackCheck,

@@ -90,6 +90,7 @@ registers! {
     0x4F SimulationMode "simulation mode",
     0x51 JointVelocity "joint velocity, mode 4",
     0x52 CartesianVelocity "Cartesian velocity, mode 5",
+    0x83 DigitalInputs "digital inputs of the control box",
     0x8C PowerBoardVersion "power board version",
     0x8D HardwareTypes "hardware types",
     0xE8 SetParameter "common parameter, set",
@@ -120,6 +121,7 @@ mod tests {
             (Register::ServoJoint, 29),
             (Register::JointPosition, 42),
             (Register::JointVelocity, 81),
+            (Register::DigitalInputs, 131),
             (Register::SetParameter, 232),
             (Register::FeedbackMask, 254),
         ];

@@ -51,6 +51,9 @@ pub enum ReplyData {
     State(ArmState),
     /// Commands in the buffer.
     Buffered(u16),
+    /// Digital inputs of the control box: bit `i` is the level of input `i` (CI0 to CI7,
+    /// then DI0 to DI7).
+    DigitalInputs(u16),
     /// Error and warning code; 0 is none.
     Fault {
         /// See [`super::ErrorCode`].
@@ -160,6 +163,7 @@ impl ReplyData {
             | Command::MoveHome { .. }
             | Command::JointJerk(_)
             | Command::JointAcceleration(_) => Self::Buffered(0),
+            Command::DigitalInputs => Self::DigitalInputs(0),
             Command::TcpPose | Command::ForwardKinematics(_) => Self::Pose(TcpPose::default()),
             Command::JointPosition(JointQuery::Commanded) => Self::Joints(JointVector::ZERO),
             Command::JointPosition(JointQuery::Quantities { quantities, .. }) => {
@@ -185,7 +189,7 @@ impl ReplyData {
                 wire.u8(&mut code);
                 *state = ArmState::from_code(code);
             }
-            Self::Buffered(count) => wire.u16_be(count),
+            Self::Buffered(word) | Self::DigitalInputs(word) => wire.u16_be(word),
             Self::Fault { error, warning } => {
                 wire.u8(error);
                 wire.u8(warning);

@@ -5,7 +5,7 @@
     reason = "arithmetic of float vectors only; integers use wrapping calls"
 )]
 
-use arm_model::{JOINTS, JointVector};
+use arm_model::JointVector;
 use serde::{Deserialize, Serialize};
 use shared_types::MonotonicNs;
 
@@ -40,10 +40,10 @@ impl Commanded {
         self.next = self.next.wrapping_add(1) % LENGTH;
     }
 
-    /// Joint farthest outside what was commanded between `from_ns` and `to_ns`,
-    /// or just before, 0-based, and how far (rad).
+    /// Least and largest of what was commanded of each joint between `from_ns` and `to_ns`, or
+    /// just before (rad).
     #[must_use]
-    pub fn farthest(&self, q: &JointVector, from_ns: u64, to_ns: u64) -> (usize, f64) {
+    pub fn bounds(&self, from_ns: u64, to_ns: u64) -> [JointVector; 2] {
         let (mut low, mut high) = (
             JointVector::splat(f64::INFINITY),
             JointVector::splat(f64::NEG_INFINITY),
@@ -60,9 +60,20 @@ impl Commanded {
                 break;
             }
         }
-        (0..JOINTS)
-            .map(|j| (j, (low[j] - q[j]).max(q[j] - high[j])))
-            .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a })
+        [low, high]
+    }
+
+    /// Setpoint of a joint (0-based) that was in force at `at_ns`: the newest sent by then (rad).
+    #[must_use]
+    pub fn in_force(&self, at_ns: u64, joint: usize) -> f64 {
+        let mut oldest = None;
+        for (sent_ns, q) in self.newest_first() {
+            oldest = Some(q);
+            if *sent_ns <= at_ns {
+                break;
+            }
+        }
+        oldest.map_or(0.0, |q| q[joint])
     }
 
     /// Setpoints are sent in the order of their times, so the ring is in order.
@@ -113,7 +124,11 @@ mod tests {
         assert!((at(90 * 4_000_000 + 1_000_001) - 90.25).abs() < 1e-12);
         assert_eq!(at(u64::MAX), 99.0);
         assert_eq!(at(0), 36.0, "older ones are forgotten");
-        let (joint, off) = history.farthest(&JointVector::splat(99.5), 300_000_000, 400_000_000);
-        assert_eq!((joint, off), (0, 0.5));
+        let [low, high] = history.bounds(300_000_000, 400_000_000);
+        assert_eq!((low[1], high[1]), (74.0, 99.0));
+        let staircase = |ns: u64| history.in_force(ns, 2);
+        assert_eq!(staircase(90 * 4_000_000 + 1), 90.0);
+        assert_eq!(staircase(91 * 4_000_000), 90.0);
+        assert_eq!(staircase(0), 36.0);
     }
 }

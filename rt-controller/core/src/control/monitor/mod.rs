@@ -5,6 +5,7 @@
 //! first; how each is met is in [`super::reaction`].
 
 pub mod history;
+pub mod prediction;
 pub mod reports;
 
 use super::exchange::{CycleInput, LinkInput};
@@ -19,8 +20,8 @@ use shared_types::ipc::{ControllerMode, RunCounts};
 
 /// Reports lag behind a change of mode by up to 0.2 s (field experience with
 /// the vendor's SDK), so state, mode and codes count only this long after
-/// bring-up.
-const SETTLE_NS: u64 = 300_000_000;
+/// bring-up. No bring-up is done before.
+pub const SETTLE_NS: u64 = 300_000_000;
 
 /// A heartbeat: its count and when it last changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -81,10 +82,15 @@ impl Monitor {
     /// The same for a new engagement: whose heart stopped before it is not taken to live.
     #[must_use]
     pub fn engaged(&self, now_ns: u64, q: JointVector) -> Self {
+        let fresh = Self::new(self.settings, now_ns, q);
+        let reports = fresh
+            .reports
+            .predicted_by(self.reports.prediction.as_ref(), q);
         Self {
             operator: self.operator,
             guardian: self.guardian,
-            ..Self::new(self.settings, now_ns, q)
+            reports,
+            ..fresh
         }
     }
 
@@ -128,6 +134,7 @@ impl Monitor {
     /// Takes in what came with this cycle.
     pub fn observe(&mut self, input: &CycleInput, limits: &Limits) {
         let now_ns = input.deadline_ns;
+        self.reports.predict(now_ns);
         self.operator.received(input.operator.count, now_ns);
         if input.guardian.guards() {
             self.guardian.received(input.guardian.count, now_ns);

@@ -7,6 +7,7 @@
 )]
 
 use super::history::Commanded;
+use super::prediction::{PREDICTED_WITHIN_NS, Prediction};
 use crate::clock_map::CLOCK_ANEW;
 use crate::control::settings::Thresholds;
 use crate::control::violation::Violation;
@@ -50,14 +51,17 @@ struct Still {
     since_ns: u64,
     /// Where (rad).
     at_rad: f64,
-    /// What was commanded then (rad).
-    commanded_rad: f64,
+    /// Where it should have been then (rad).
+    expected_rad: f64,
 }
 
 /// What is remembered of the reports, and of what was commanded. RT-safe.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReportWatch {
     commanded: Commanded,
+    /// Where the joints should be, if the arm was measured. Whoever writes a state appends it.
+    #[serde(skip)]
+    pub(in crate::control) prediction: Option<Prediction>,
     newest: Option<JointReport>,
     /// Since when the values are the same, to the bit (stamp, ns).
     frozen_since_ns: u64,
@@ -78,9 +82,45 @@ impl ReportWatch {
         }
     }
 
+    /// The same of an arm that was measured.
+    #[must_use]
+    pub fn predicted_by(self, prediction: Option<&Prediction>, q: JointVector) -> Self {
+        let prediction = prediction.map(|known| known.holding(q));
+        Self { prediction, ..self }
+    }
+
     /// A setpoint was sent.
     pub fn sent(&mut self, deadline_ns: u64, q: JointVector) {
         self.commanded.push(deadline_ns, q);
+    }
+
+    /// It is `now_ns`: what has been sent by now decides where the joints should be.
+    pub fn predict(&mut self, now_ns: u64) {
+        if let Some(prediction) = &mut self.prediction {
+            prediction.advance(now_ns, &self.commanded);
+        }
+    }
+
+    /// Where each joint should have been `window_ns` before `at_ns` (rad): by its prediction, a
+    /// little before, if it was measured, else by what was commanded.
+    fn expected(&self, at_ns: u64, window_ns: u64) -> JointVector {
+        let commanded = self.commanded.at(at_ns.saturating_sub(window_ns));
+        self.prediction.as_ref().map_or(commanded, |known| {
+            let from_ns = at_ns.saturating_sub(window_ns.min(PREDICTED_WITHIN_NS));
+            known.or_else(known.at(from_ns), commanded)
+        })
+    }
+
+    /// How far each joint of a report is outside its prediction if it was measured, else outside
+    /// all that was commanded within `window_ns` (rad); below zero inside.
+    fn outside(&self, report: &JointReport, window_ns: u64) -> JointVector {
+        let (q, stamp_ns) = (&report.q, report.stamp_ns);
+        let from_ns = stamp_ns.saturating_sub(window_ns);
+        let until_ns = stamp_ns.max(report.arrival_ns);
+        let commanded = outside(q, &self.commanded.bounds(from_ns, until_ns));
+        self.prediction.as_ref().map_or(commanded, |known| {
+            known.or_else(outside(q, &known.bounds(stamp_ns)), commanded)
+        })
     }
 
     /// Newest good report.
@@ -104,11 +144,11 @@ impl ReportWatch {
     /// anew.
     pub fn take(&mut self, report: &JointReport, window_ns: u64, limits: &Limits) -> bool {
         self.broken_in_a_row = 0;
-        let commanded_rad = self.commanded.at(report.stamp_ns);
+        let expected_rad = self.expected(report.stamp_ns, 0);
         let stands = |j: usize| Still {
             since_ns: report.stamp_ns,
             at_rad: report.q[j],
-            commanded_rad: commanded_rad[j],
+            expected_rad: expected_rad[j],
         };
         let before = self.newest.replace(*report);
         let Some(before) = before else {
@@ -139,9 +179,8 @@ impl ReportWatch {
         // the search.
         let until_ns = report.stamp_ns.max(report.arrival_ns);
         let off_rad = || {
-            self.commanded
-                .farthest(&report.q_target, from_ns, until_ns)
-                .1
+            let bounds = self.commanded.bounds(from_ns, until_ns);
+            farthest(&outside(&report.q_target, &bounds)).1
         };
         let foreign = report.arm_clock != 0 && off_rad() > TARGET_RAD;
         // A report that repeats itself says nothing new.
@@ -188,10 +227,8 @@ impl ReportWatch {
         }
         let report = self.newest.as_ref()?;
         let frozen_ns = report.stamp_ns.saturating_sub(self.frozen_since_ns);
-        let must_show = self
-            .commanded
-            .at(report.stamp_ns.saturating_sub(t.tracking_window_ns));
-        let moved_rad = (must_show - self.commanded.at(self.frozen_since_ns)).max_abs();
+        let must_show = self.expected(report.stamp_ns, t.tracking_window_ns);
+        let moved_rad = (must_show - self.expected(self.frozen_since_ns, 0)).max_abs();
         (frozen_ns > t.report_frozen_ns.max(t.tracking_window_ns) && moved_rad > FROZEN_RAD)
             .then(|| Violation::of_time(FaultCode::ReportFrozen, frozen_ns, t.report_frozen_ns))
     }
@@ -209,11 +246,11 @@ impl ReportWatch {
             return None;
         }
         let from_ns = report.stamp_ns.saturating_sub(t.tracking_window_ns);
-        let must_show = self.commanded.at(from_ns);
+        let must_show = self.expected(report.stamp_ns, t.tracking_window_ns);
         for (j, still) in self.still.iter().enumerate() {
-            let commanded_rad = (must_show[j] - still.commanded_rad).abs();
+            let moved_rad = (must_show[j] - still.expected_rad).abs();
             let off_rad = (must_show[j] - still.at_rad).abs();
-            if still.since_ns < from_ns && commanded_rad > STUCK_RAD && off_rad > STUCK_RAD {
+            if still.since_ns < from_ns && moved_rad > STUCK_RAD && off_rad > STUCK_RAD {
                 let fault = FaultCode::JointStuck;
                 return Some(Violation::of_joint(fault, j, off_rad, STUCK_RAD));
             }
@@ -224,15 +261,12 @@ impl ReportWatch {
             .then(|| Violation::of_joint(FaultCode::TrackingError, joint, off_rad, most))
     }
 
-    /// Joint (0-based) whose newest measured position is farthest outside what
-    /// commanded within `window_ns`, and how far (rad).
+    /// Joint (0-based) whose newest measured position is farthest outside its prediction, or
+    /// outside what was commanded within `window_ns`, and how far (rad).
     #[must_use]
     pub fn tracking_error(&self, window_ns: u64) -> (usize, f64) {
-        self.newest.map_or((0, 0.0), |report| {
-            let from_ns = report.stamp_ns.saturating_sub(window_ns);
-            self.commanded
-                .farthest(&report.q, from_ns, report.stamp_ns.max(report.arrival_ns))
-        })
+        self.newest
+            .map_or((0, 0.0), |r| farthest(&self.outside(&r, window_ns)))
     }
 
     /// How far the newest measured pose is behind what was commanded when it was
@@ -242,6 +276,20 @@ impl ReportWatch {
         self.newest
             .map_or(JointVector::ZERO, |r| self.commanded.at(r.stamp_ns) - r.q)
     }
+}
+
+/// How far each joint is outside its bounds (rad); below zero inside.
+fn outside(q: &JointVector, [low, high]: &[JointVector; 2]) -> JointVector {
+    JointVector(core::array::from_fn(|j| {
+        (low[j] - q[j]).max(q[j] - high[j])
+    }))
+}
+
+/// The joint (0-based) that is farthest off, and how far (rad).
+fn farthest(off: &JointVector) -> (usize, f64) {
+    (0..JOINTS)
+        .map(|j| (j, off[j]))
+        .fold((0, 0.0), |a, b| if b.1 > a.1 { b } else { a })
 }
 
 /// A joint that moved farther between two reports than any joint can.

@@ -117,6 +117,7 @@ impl Command {
                 synchronised: false,
                 duration_s: None,
             },
+            Register::DigitalInputs => Self::DigitalInputs,
             Register::SetParameter => Self::SetSpeedLimitFactor(0.0),
             Register::GetParameter => Self::GetSpeedLimitFactor,
             Register::FeedbackCheck => Self::FeedbackCheck,
@@ -136,6 +137,7 @@ impl Command {
             | Self::CleanError
             | Self::CleanWarning
             | Self::TcpPose
+            | Self::DigitalInputs
             | Self::FeedbackCheck => {}
             Self::MotionEnable {
                 joint,

@@ -134,6 +134,7 @@ fn requests_and_replies_have_the_vendors_layout() {
     let (error, warning) = (22, 11);
     for (reply, register, data) in [
         (ReplyData::Fault { error, warning }, 15, vec![22, 11]),
+        (ReplyData::DigitalInputs(0xFFFD), 131, vec![0xFF, 0xFD]),
         (
             motion,
             42,
@@ -189,6 +190,7 @@ fn these_registers_are_typed() {
         R::ForwardKinematics,
         R::JointLimitTest,
         R::JointVelocity,
+        R::DigitalInputs,
         R::SetParameter,
         R::GetParameter,
         R::FeedbackCheck,
