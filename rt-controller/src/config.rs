@@ -1,11 +1,12 @@
 //! Configuration of the controller process.
 
 use crate::arm_settings::ArmSettings;
+use crate::control::monitor::prediction::{DEAD_TIME_MAX_S, MeasuredLag, MeasuredLags};
 use crate::control::settings::TRACKING_WINDOW_MAX_MS;
 use crate::control::{ControlSettings, Thresholds};
 use crate::os::RealTimeSettings;
 use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
-use arm_model::Limits;
+use arm_model::{ArmResponse, Limits, Pole};
 use serde::{Deserialize, Serialize};
 use shared_types::CommandInterface;
 use std::net::{IpAddr, Ipv4Addr};
@@ -58,15 +59,23 @@ pub struct ControllerConfig {
     pub on_difference: OnDifference,
     /// What the arm must be set to.
     pub arm_settings: ArmSettings,
+    /// The pole, as the cell has it; its end is what set-up motions and wiggles keep slow.
+    pub pole: Pole,
     /// How setpoints reach the arm.
     pub command_interface: CommandInterface,
     /// Whether motions need an arming. Without, every motion runs as a throw
     /// would; for tests of other things.
     pub arming_required: bool,
+    /// The operator's enabling switch, where one is wired to the arm.
+    pub enabling_input: Option<EnablingInput>,
     /// File with the limits, relative to this file.
     pub limits_file: Option<PathBuf>,
     /// Limits given here; without either, those of an xArm 7.
     pub limits: Option<Limits>,
+    /// How the arm follows its setpoints, as `wag latency` measured it; relative to this file.
+    /// Its joints are then compared with where they should be by that, not with all that was
+    /// commanded within the tracking window.
+    pub arm_response_file: Option<PathBuf>,
     /// What the control thread asks of the machine.
     pub real_time: RealTimeSettings,
     /// When the monitors give up.
@@ -90,12 +99,35 @@ impl Default for ControllerConfig {
             arm_settings: ArmSettings::default(),
             limits_file: None,
             limits: None,
+            arm_response_file: None,
             real_time: RealTimeSettings::default(),
             thresholds: ThresholdSettings::default(),
+            pole: Pole::default(),
             command_interface: CommandInterface::default(),
             arming_required: true,
+            enabling_input: None,
             guardian: GuardianSettings::default(),
         }
+    }
+}
+
+/// An enabling switch at a digital input of the arm's control box: nothing is armed unless it
+/// is held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnablingInput {
+    /// Number of the input: 0 to 7 for CI0 to CI7, 8 to 15 for DI0 to DI7.
+    pub number: u8,
+    /// Level of the input while the switch is held. A broken wire must give the other one.
+    pub held_high: bool,
+}
+
+impl EnablingInput {
+    /// Whether the switch is held at these levels of all inputs.
+    #[must_use]
+    pub const fn is_held(self, levels: u16) -> bool {
+        let high = levels.unbounded_shr(self.number as u32) & 1 != 0;
+        self.number < 16 && high == self.held_high
     }
 }
 
@@ -243,11 +275,14 @@ fn require(
 }
 
 impl ControllerConfig {
-    /// Reads a file; a relative `limits_file` is looked for beside it.
+    /// Reads a file; relative files that it names are looked for beside it.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let mut config: Self = read_toml(path)?;
-        if let (Some(file), Some(folder)) = (&config.limits_file, path.parent()) {
-            config.limits_file = Some(folder.join(file));
+        let files = [&mut config.limits_file, &mut config.arm_response_file];
+        for file in files.into_iter().flatten() {
+            if let Some(folder) = path.parent() {
+                *file = folder.join(&*file);
+            }
         }
         Ok(config)
     }
@@ -266,6 +301,18 @@ impl ControllerConfig {
         let rated = limits.check_rating();
         rated.map_err(|reason| ConfigError(format!("limits: {reason}")))?;
         Ok(limits)
+    }
+
+    /// The lags of the joints that `arm_response_file` tells of; none without.
+    ///
+    /// # Errors
+    /// The file cannot be read or used.
+    pub fn measured_lags(&self) -> Result<MeasuredLags, ConfigError> {
+        let Some(path) = &self.arm_response_file else {
+            return Ok(MeasuredLags::default());
+        };
+        let lags = measured_lags(&read_toml(path)?);
+        lags.map_err(|ConfigError(why)| ConfigError(format!("{}: {why}", path.display())))
     }
 
     /// Whether real-time properties that cannot be had are a refusal.
@@ -323,6 +370,9 @@ impl ControllerConfig {
                 )));
             }
         }
+        if let Some(EnablingInput { number, .. }) = self.enabling_input {
+            require(number < 16, "enabling_input.number", number, "0 to 15")?;
+        }
         let warm_up_us = self.real_time.warm_up_us;
         let holds = warm_up_us <= WARM_UP_MAX_US;
         require(holds, "real_time.warm_up_us", warm_up_us, "0 to 1000 us")?;
@@ -333,6 +383,28 @@ impl ControllerConfig {
             _ => Ok(()),
         }
     }
+}
+
+/// The lags of an arm's joints, as the controller predicts by them.
+///
+/// # Errors
+/// A dead time is longer than setpoints are remembered.
+pub fn measured_lags(response: &ArmResponse) -> Result<MeasuredLags, ConfigError> {
+    let lags = response.joints.map(|joint| {
+        joint.lag().map(|lag| MeasuredLag {
+            dead_time_s: lag.dead_time_s.value,
+            natural_frequency_rad_s: core::f64::consts::TAU * lag.natural_frequency_hz.value,
+            damping_ratio: lag.damping_ratio.value,
+        })
+    });
+    let dead_s = lags.iter().flatten().map(|lag| lag.dead_time_s);
+    let longest_s = dead_s.fold(0.0, f64::max);
+    if longest_s <= DEAD_TIME_MAX_S {
+        return Ok(lags);
+    }
+    Err(ConfigError(format!(
+        "a dead time is {longest_s:.3} s, longer than the {DEAD_TIME_MAX_S} s that the controller can watch: measure the arm again on a direct cable"
+    )))
 }
 
 fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, ConfigError> {
@@ -371,6 +443,10 @@ mod tests {
             ("real_time.priority = 5", "11 to 99"),
             ("real_time.warm_up_us = 1001", "1000"),
             ("arm_settings.collision_sensitivity = 6", "off"),
+            (
+                "enabling_input = { number = 16, held_high = false }",
+                "0 to 15",
+            ),
         ] {
             let said = parse(text).unwrap().check().unwrap_err().to_string();
             let (key, _) = text.split_once(' ').unwrap();

@@ -22,6 +22,7 @@
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 pub mod arm_settings;
+pub mod armed_speed;
 pub mod bridge;
 pub mod commander;
 pub mod config;

@@ -54,7 +54,7 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
     bus.remove_leftovers();
     let rings = rings();
     let mut threads = Threads::default();
-    let control = ControlState::new(limits.clone(), settings);
+    let control = ControlState::new(limits.clone(), settings).measured(&config.measured_lags()?);
     let broken = rings.rt.broken.clone();
     let quit = Arc::clone(&threads.quit);
     let body = move |mut rt: RtLoop<TcpLink, MonotonicClock>| {
@@ -194,7 +194,7 @@ pub(crate) fn start_loop<T: ArmTransport + Send + 'static>(
 ) -> Result<(JoinHandle<()>, Vec<String>), ControllerError> {
     let (domain, settings) = (domain.to_owned(), settings.clone());
     let (limits, interface) = (control.limits().clone(), control.settings().interface);
-    let warm_up = CacheWarmUp::new(limits, interface, settings.warm_up_us)?;
+    let warm_up = CacheWarmUp::new(limits, interface, settings.warm_up_us)?.for_arm_of(&control);
     let (ready, wait) = mpsc::channel();
     let thread = move || {
         // Blackboard handles stay in the thread that made them.

@@ -124,6 +124,14 @@ impl ArmSession {
         })
     }
 
+    /// Levels of the control box's digital inputs, bit `i` of input `i`.
+    pub fn digital_inputs(&mut self) -> Result<u16, SessionError> {
+        match self.ask(&Command::DigitalInputs)? {
+            ReplyData::DigitalInputs(levels) => Ok(levels),
+            _ => Err(ReplyError::Invalid(Command::DigitalInputs.register().code()).into()),
+        }
+    }
+
     /// State of the arm.
     pub fn state(&mut self) -> Result<ArmState, SessionError> {
         match self.ask(&Command::GetState)? {

@@ -119,6 +119,13 @@ impl CacheWarmUp {
         })
     }
 
+    /// The same for the arm that a controller drives: its predictions are warmed up, too.
+    #[must_use]
+    pub fn for_arm_of(mut self, control: &ControlState) -> Self {
+        self.shadow = self.shadow.measured_as(control);
+        self
+    }
+
     /// One cycle of the shadow controller, due at `deadline_ns`. RT-safe.
     pub fn cycle(&mut self, deadline_ns: u64, operator: OperatorBeat, guardian: GuardianBeat) {
         self.cycles = self.cycles.wrapping_add(1);

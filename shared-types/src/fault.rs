@@ -91,7 +91,8 @@ fault_codes! {
     PlanOutOfLimits = 41: "the plan breaks a limit; check it with `wag check`";
     PlanHashMismatch = 42: "the plan was damaged on its way; send it again";
     WrongMode = 43: "the command does not fit the controller's present mode";
-    NotArmed = 44: "the arm is not armed for this motion; arm it, for a throw with the area clear";
+    NotArmed = 44:
+        "the arm is not armed for this motion; arm it, for a wiggle or a throw with the area confirmed clear";
     OperatingModeExceeded = 45:
         "the motion is faster than its operating mode allows; slow it down or arm for a faster one";
     ArmingExpired = 46:

@@ -16,10 +16,10 @@ pub enum OperatingMode {
     /// Setting up and teaching: at most 250 mm/s at the tool.
     #[default]
     SetUp = 1,
-    /// Wiggles: at most 500 mm/s at the tool unless configured otherwise.
+    /// Wiggles: at most 500 mm/s at the tool unless configured otherwise, begun within ten
+    /// seconds of the confirmation that the area is clear.
     Wiggle = 2,
-    /// One throw at the full limits, begun within ten seconds of arming by an
-    /// operator who declared the area clear.
+    /// One throw at the full limits, begun within ten seconds of that confirmation.
     Throw = 3,
 }
 
@@ -41,7 +41,7 @@ pub struct Arming {
     /// Motions must begin before this instant (CLOCK_MONOTONIC, ns). For throws
     /// the controller allows ten seconds at most.
     pub expires_ns: u64,
-    /// The operator declared that nobody is within reach of arm and rope;
-    /// throws need it.
+    /// The operator confirmed that nobody is within reach of arm and rope; throws need it.
+    /// When that was is checked where the arming is requested.
     pub area_clear: bool,
 }

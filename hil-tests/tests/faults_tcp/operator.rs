@@ -2,10 +2,12 @@
 
 use super::child::{Process, Role};
 use super::stand::{Stand, arm_for};
+use rt_controller::config::EnablingInput;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::ipc::{ControllerMode, OperatorEnd};
 use shared_types::{FaultCode, OperatingMode};
 use std::time::Duration;
+use xarm_sim::{ArmConfig, clock};
 
 /// Works again after a stop in which it was braked in joint space and the arm left ready.
 fn recovers_from_a_brake(stand: Stand) {
@@ -24,7 +26,7 @@ fn fault_36_a_dead_man_switch_let_go_brakes_and_holds_until_it_is_held_again() {
     stand.stops(&pending, &[fault]);
     // Acknowledged, but not held: no arming.
     stand.make_ready();
-    let arming = arm_for(OperatingMode::SetUp, true);
+    let arming = arm_for(OperatingMode::SetUp, None);
     assert_eq!(stand.refused(&arming).0, fault);
     stand.operator.as_mut().unwrap().hold();
     recovers_from_a_brake(stand);
@@ -57,7 +59,101 @@ fn a_stop_during_the_bring_up_is_not_lost() {
         assert_eq!(stand.ask(&ControllerRequest::Stop), ControllerEvent::Done);
         stand.answer(&set_up);
         assert_ne!(stand.mode(), ControllerMode::Idle, "after {wait_ms} ms");
-        let arming = arm_for(OperatingMode::Throw, true);
+        let arming = arm_for(OperatingMode::Throw, Some(clock::now()));
         assert_eq!(stand.refused(&arming).0, FaultCode::WrongMode);
     }
+}
+
+/// Whoever armed a throw could say so long before, and of another pose.
+#[test]
+fn an_arming_wants_a_fresh_confirmation_given_to_an_arm_at_rest() {
+    let mut stand = Stand::ready("confirmed");
+    let before = clock::now();
+    stand.throws();
+    for (confirmed, why) in [
+        (None, "nobody confirmed"),
+        (Some(before), "came to rest"),
+        (Some(before.plus_s(-60.0)), "it must be within 10 s"),
+        (Some(clock::now().plus_s(60.0)), "in the future"),
+    ] {
+        for mode in [OperatingMode::Wiggle, OperatingMode::Throw] {
+            let (fault, message) = stand.refused(&arm_for(mode, confirmed));
+            assert_eq!(fault, FaultCode::NotArmed);
+            assert!(message.contains(why), "{message}");
+        }
+    }
+    // What is armed has not begun yet, and moves elsewhere: the confirmation was for here.
+    let arm_for_a_throw = || arm_for(OperatingMode::Throw, Some(clock::now()));
+    assert_eq!(stand.ask(&arm_for_a_throw()), ControllerEvent::Done);
+    let mut q = stand.commanded();
+    q[6] += 0.1;
+    let speed_fraction = 0.1;
+    let moved = stand.call(&ControllerRequest::MoveTo { q, speed_fraction });
+    stand.finishes(&moved);
+    let swing = stand.swing_here();
+    let (fault, message) = stand.refused(&swing);
+    assert_eq!(fault, FaultCode::NotArmed);
+    assert!(message.contains("came to rest"), "{message}");
+    // The ten seconds count from the confirmation, not from the arming.
+    let confirmed = clock::now();
+    stand.rest(Duration::from_secs(8));
+    let arming = arm_for(OperatingMode::Throw, Some(confirmed));
+    assert_eq!(stand.ask(&arming), ControllerEvent::Done);
+    stand.rest(Duration::from_millis(2500));
+    let swing = stand.swing_here();
+    assert_eq!(stand.refused(&swing).0, FaultCode::NotArmed);
+    stand.finish();
+}
+
+#[test]
+fn nothing_is_armed_unless_the_enabling_switch_is_held() {
+    let number = 3;
+    for (levels, held_high, is_held) in [
+        (0x0008, true, true),
+        (0x0008, false, false),
+        (0xFFF7, false, true),
+        (0xFFF7, true, false),
+    ] {
+        let arm = ArmConfig {
+            digital_inputs: levels,
+            ..ArmConfig::default()
+        };
+        let mut stand = Stand::with("enabling", arm, |config| {
+            config.enabling_input = Some(EnablingInput { number, held_high });
+        });
+        stand.make_ready();
+        for mode in [OperatingMode::SetUp, OperatingMode::Throw] {
+            let arming = arm_for(mode, Some(clock::now()));
+            if is_held {
+                assert_eq!(stand.ask(&arming), ControllerEvent::Done);
+            } else {
+                let (fault, message) = stand.refused(&arming);
+                assert_eq!(fault, FaultCode::NotArmed);
+                assert!(message.contains("digital input 3"), "{message}");
+            }
+        }
+        stand.finish();
+    }
+}
+
+/// Until the loop has armed, nothing is known by which a motion could be judged.
+#[test]
+fn a_motion_asked_for_while_an_arming_is_under_way_is_refused() {
+    let mut stand = Stand::ready("arming");
+    let mut q = stand.commanded();
+    q[5] -= 0.1;
+    let speed_fraction = 1.0;
+    let asked = [
+        arm_for(OperatingMode::SetUp, None),
+        ControllerRequest::MoveTo { q, speed_fraction },
+    ];
+    let [armed, moved] = asked.map(|request| stand.call(&request));
+    assert_eq!(stand.answer(&armed), ControllerEvent::Done);
+    match stand.answer(&moved) {
+        ControllerEvent::Refused { fault, .. } => assert_eq!(fault, FaultCode::WrongMode),
+        // It was looked at after the loop had armed.
+        ControllerEvent::Finished { .. } => {}
+        other => panic!("{other:?}"),
+    }
+    stand.finish();
 }

@@ -3,18 +3,20 @@
 use super::stand::{PATIENCE, Stand, arm_for, execute, swing};
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, Limits, LimitsSpec};
+use hil_tests::scenario::entry;
 use rt_controller::arm_settings::Load;
 use rt_controller::commander::CommanderLock;
 use rt_controller::config::OnDifference;
+use rt_controller::recording::RecordedCycle;
 use rt_controller::session::ArmSession;
 use rt_controller::xarm::report::{NormalReport, RICH_REPORT_LEN};
-use rt_controller::xarm::{Command, ReplyData};
+use rt_controller::xarm::{Command, Mode, ReplyData};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::{FaultCode, OperatingMode};
 use std::io::Read;
 use std::net::TcpStream;
-use xarm_sim::ArmConfig;
+use xarm_sim::{ArmConfig, clock};
 
 #[test]
 fn motions_need_a_bring_up_and_an_arming_and_a_throw_is_armed_once() {
@@ -26,16 +28,16 @@ fn motions_need_a_bring_up_and_an_arming_and_a_throw_is_armed_once() {
         q,
         speed_fraction: 0.1,
     };
-    for early in [move_to(aside), arm_for(OperatingMode::SetUp, false)] {
+    for early in [move_to(aside), arm_for(OperatingMode::SetUp, None)] {
         assert_eq!(stand.refused(&early).0, FaultCode::WrongMode);
     }
     stand.make_ready();
     let throw = execute(&swing(START_POSE));
-    for unarmed in [throw.clone(), arm_for(OperatingMode::Throw, false)] {
+    for unarmed in [throw.clone(), arm_for(OperatingMode::Throw, None)] {
         assert_eq!(stand.refused(&unarmed).0, FaultCode::NotArmed);
     }
 
-    let armed = arm_for(OperatingMode::SetUp, false);
+    let armed = arm_for(OperatingMode::SetUp, None);
     assert_eq!(stand.ask(&armed), ControllerEvent::Done);
     match stand.ask(&ControllerRequest::Status) {
         ControllerEvent::Status { operating_mode, .. } => {
@@ -115,16 +117,21 @@ fn a_motion_faster_than_it_is_armed_for_is_refused_before_it_begins() {
     aside[0] += 0.6;
     let there_and_back = [START_POSE, aside, START_POSE];
     let swung = execute(&JointTrajectory::new(&[0.0, 0.8, 1.6], &there_and_back).unwrap());
-    let moved = ControllerRequest::MoveTo {
-        q: aside,
-        speed_fraction: 0.5,
-    };
+    // About joint 6 the pole's end is 2.5 times as fast as the flange: 0.46 m/s.
+    let mut turned = START_POSE;
+    turned[5] -= 0.5;
+    let times = [0.0, 0.5, 1.0];
+    let pole = JointTrajectory::new(&times, &[START_POSE, turned, START_POSE]).unwrap();
+    let pole = execute(&pole);
     for (armed, request) in [
-        (OperatingMode::SetUp, &moved),
         (OperatingMode::SetUp, &swung),
         (OperatingMode::Wiggle, &swung),
+        (OperatingMode::SetUp, &pole),
     ] {
-        assert_eq!(stand.ask(&arm_for(armed, true)), ControllerEvent::Done);
+        assert_eq!(
+            stand.ask(&arm_for(armed, Some(clock::now()))),
+            ControllerEvent::Done
+        );
         let (fault, message) = stand.refused(request);
         assert_eq!(fault, FaultCode::OperatingModeExceeded, "{message}");
         assert!(
@@ -134,7 +141,7 @@ fn a_motion_faster_than_it_is_armed_for_is_refused_before_it_begins() {
         assert_eq!(stand.mode(), ControllerMode::Idle);
     }
     assert_eq!(
-        stand.ask(&arm_for(OperatingMode::Throw, true)),
+        stand.ask(&arm_for(OperatingMode::Throw, Some(clock::now()))),
         ControllerEvent::Done
     );
     match stand.ask(&swung) {
@@ -231,4 +238,88 @@ fn an_arm_set_otherwise_than_configured_is_refused_or_set() {
     assert!((found.load_centre_m[2] - 0.08).abs() < 1e-6, "{found:?}");
     assert_eq!(found.collision_sensitivity, 4);
     stand.finish();
+}
+
+/// Each bring-up that held the measured pose would let a drooping joint down further.
+#[test]
+fn an_arm_that_droops_is_held_as_commanded_and_one_that_is_elsewhere_where_it_stands() {
+    for (droop_rad, follows) in [(0.001, false), (0.02, true)] {
+        let droop = format!("encoder_jump, joint = 2, by_rad = {droop_rad}");
+        let arm = ArmConfig {
+            faults: entry("at_s = 0.0", &droop).parse().unwrap(),
+            ..ArmConfig::default()
+        };
+        let mut stand = Stand::with("droop", arm, |_| ());
+        stand.make_ready();
+        let off_rad = stand.commanded()[1] - START_POSE[1];
+        let expected_rad = if follows { droop_rad } else { 0.0 };
+        assert!((off_rad - expected_rad).abs() < 1e-4, "{off_rad}");
+        stand.finish();
+    }
+}
+
+/// For a third of a second the reports of an arm say nothing of the mode that it was brought
+/// into; until then nothing is armed or moves.
+#[test]
+fn a_bring_up_is_done_when_the_arms_reports_count() {
+    const LEFT: [FaultCode; 2] = [FaultCode::ArmModeChanged, FaultCode::ArmNotReady];
+    let mut stand = Stand::start("settles");
+    let bring_up = stand.call(&ControllerRequest::Bringup);
+    stand.wait_until("the engagement", |s| s.mode() == ControllerMode::Idle);
+    let early = [
+        arm_for(OperatingMode::SetUp, None),
+        ControllerRequest::MoveTo {
+            q: START_POSE,
+            speed_fraction: 0.1,
+        },
+    ];
+    let early = early.map(|request| stand.call(&request));
+    for pending in early {
+        match stand.answer(&pending) {
+            ControllerEvent::Refused { fault, message } => {
+                assert_eq!(fault, FaultCode::WrongMode);
+                assert!(message.contains("bring-up is under way"), "{message}");
+            }
+            other => panic!("not refused: {other:?}"),
+        }
+    }
+    // Somebody takes the arm out of its mode before anything could tell.
+    let arm = (stand.config.arm, stand.config.command_port).into();
+    let mut other = ArmSession::connect(arm, PATIENCE).unwrap();
+    other.ask(&Command::SetMode(Mode::Position)).unwrap();
+    match stand.answer(&bring_up) {
+        // Replies to setpoints may tell it before the reports do.
+        ControllerEvent::Refused { fault, .. } if LEFT.contains(&fault) => {}
+        answer => panic!("not refused: {answer:?}"),
+    }
+    stand.expect(&LEFT);
+    stand.finish();
+}
+
+/// A move is as fast as it is armed for at most, whatever was asked for.
+#[test]
+fn the_poles_end_keeps_the_speed_that_a_move_is_armed_for() {
+    for (armed, most_m_s) in [(OperatingMode::SetUp, 0.25), (OperatingMode::Throw, 1.0)] {
+        let mut stand = Stand::ready("pole_speed");
+        let mut turned = START_POSE;
+        (turned[0], turned[5]) = (turned[0] + 0.5, turned[5] - 0.9);
+        let arming = arm_for(armed, Some(clock::now()));
+        assert_eq!(stand.ask(&arming), ControllerEvent::Done);
+        let pending = stand.call(&ControllerRequest::MoveTo {
+            q: turned,
+            speed_fraction: 1.0,
+        });
+        stand.finishes(&pending);
+        let (pole, period_s) = (stand.config.pole, Limits::default().period_s());
+        let flight = stand.finish();
+        let moving = |c: &&RecordedCycle| c.record.mode == ControllerMode::Moving as u8;
+        let moved = flight.cycles.iter().filter(moving);
+        let ends: Vec<_> = moved.map(|c| pole.attach_pose(&c.record.q_c).0).collect();
+        let steps_m = ends.windows(2).map(|w| (w[1] - w[0]).norm());
+        let top_m_s = steps_m.fold(0.0, f64::max) / period_s;
+        assert!(
+            (0.7 * most_m_s..1.01 * most_m_s).contains(&top_m_s),
+            "{armed:?}: {top_m_s} m/s"
+        );
+    }
 }

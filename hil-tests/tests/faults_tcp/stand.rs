@@ -56,10 +56,11 @@ fn swings(from: JointVector, count: usize) -> JointTrajectory {
     JointTrajectory::new(&times[..=2 * count], &poses[..=2 * count]).unwrap()
 }
 
-pub fn arm_for(operating_mode: OperatingMode, area_clear: bool) -> ControllerRequest {
+/// An arming whose area is confirmed clear at `confirmed`, if at all.
+pub fn arm_for(operating_mode: OperatingMode, confirmed: Option<MonotonicNs>) -> ControllerRequest {
     ControllerRequest::Arm {
         operating_mode,
-        area_clear,
+        confirmed_ns: confirmed.map(|at| at.0),
     }
 }
 
@@ -303,13 +304,18 @@ impl Stand {
     }
 
     pub fn arm_for(&mut self, operating_mode: OperatingMode) -> ControllerEvent {
-        self.ask(&arm_for(operating_mode, true))
+        self.ask(&arm_for(operating_mode, Some(clock::now())))
     }
 
     /// Adds a fault of the arm that strikes when it is at speed.
     pub fn inject(&self, fault: &str) {
         let script: FaultScript = entry("on = 'speed:0.5'", fault).parse().unwrap();
         self.arm.inject(script.faults[0]);
+    }
+
+    /// What lets the arm swing from where it stands.
+    pub fn swing_here(&mut self) -> ControllerRequest {
+        execute(&swing(self.commanded()))
     }
 
     /// Arms and begins to swing from where the arm stands.
@@ -368,7 +374,7 @@ impl Stand {
         assert_eq!(self.mode(), ControllerMode::Faulted);
         let from = self.commanded();
         for request in [
-            arm_for(OperatingMode::Throw, true),
+            arm_for(OperatingMode::Throw, Some(clock::now())),
             ControllerRequest::MoveTo {
                 q: START_POSE,
                 speed_fraction: 0.1,

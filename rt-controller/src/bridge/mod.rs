@@ -7,6 +7,7 @@
 //! waits for it.
 
 mod answers;
+mod arming;
 mod latency;
 mod recording;
 mod requests;
@@ -14,6 +15,7 @@ mod uploads;
 
 use crate::commander::CommanderLock;
 use crate::config::ControllerConfig;
+use crate::control::monitor::SETTLE_NS;
 use crate::control::{ArmCodes, ControlCommand, ControlEvent, ControlSettings, Motion};
 use crate::driver::CommandMsg;
 use crate::error::ControllerError;
@@ -41,7 +43,7 @@ use uploads::Uploads;
 
 /// Longest wait for one answer of the arm while it is set up.
 const SET_UP_TIMEOUT: Duration = Duration::from_secs(2);
-/// The same for a question about an error, when callers wait.
+/// The same for a question about an error or a digital input, when callers wait.
 const QUESTION_TIMEOUT: Duration = Duration::from_millis(200);
 /// Longest wait of a bring-up for the first joint report and for the guardian.
 const REPORT_WAIT: Duration = Duration::from_secs(3);
@@ -92,6 +94,10 @@ pub struct Bridge {
     open: Vec<Open>,
     uploads: Uploads,
     operating_mode: Option<OperatingMode>,
+    /// When the arm last came to rest (CLOCK_MONOTONIC, ns).
+    at_rest_ns: u64,
+    /// When the area was confirmed clear for what is armed (CLOCK_MONOTONIC, ns).
+    confirmed_ns: Option<u64>,
     last_id: u64,
     /// Asks the arm to stop until it says that it has.
     stopping: Option<JoinHandle<()>>,
@@ -138,6 +144,8 @@ impl Bridge {
             open: Vec::new(),
             uploads: Uploads::default(),
             operating_mode: None,
+            at_rest_ns: 0,
+            confirmed_ns: None,
             last_id: 0,
             stopping: None,
         })
@@ -259,6 +267,7 @@ impl Bridge {
         match event {
             ControlEvent::Engaged => {
                 self.arm_error = ErrorCode::NONE;
+                self.at_rest_ns = now_ns();
                 for open in &mut self.open {
                     if let Awaited::Engaged { held, .. } = &mut open.awaits {
                         *held = true;
@@ -279,7 +288,10 @@ impl Bridge {
                 id,
                 start_ns,
                 end_ns,
-            } => self.on_finished(id, &ControllerEvent::Finished { start_ns, end_ns }),
+            } => {
+                self.at_rest_ns = end_ns;
+                self.on_finished(id, &ControllerEvent::Finished { start_ns, end_ns });
+            }
             ControlEvent::Refused { id, fault } => {
                 let refused = |awaits: &Awaited| match (awaits, id) {
                     (Awaited::Motion { id, .. }, Some(refused)) => *id == refused,
@@ -405,9 +417,11 @@ impl Bridge {
     /// Answers bring-ups whose arm is held and reports its joints.
     fn settle_engagements(&mut self) {
         let stale_ns = self.settings.thresholds.report_stale_ns;
-        let fresh = self
-            .newest_report
-            .is_some_and(|r| now_ns().saturating_sub(r.arrival_ns) < stale_ns);
+        // Before, a report says nothing of the mode that the arm was brought into.
+        let counts_ns = self.at_rest_ns.saturating_add(SETTLE_NS);
+        let fresh = self.newest_report.is_some_and(|r| {
+            r.arrival_ns > counts_ns && now_ns().saturating_sub(r.arrival_ns) < stale_ns
+        });
         let held = |a: &Awaited| matches!(a, Awaited::Engaged { held: true, .. });
         let guarded = self.guarded || !self.config.guardian.required;
         for open in self.take(|awaits| held(awaits) && fresh && guarded) {

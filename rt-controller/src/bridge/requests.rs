@@ -4,28 +4,24 @@ use super::answers::{ControllerCall, answer, refuse};
 use super::{Awaited, Bridge, Open, REPORT_WAIT, SET_UP_TIMEOUT};
 use crate::commander::CommanderLock;
 use crate::control::{ControlCommand, Motion};
-use crate::os::now_ns;
 use crate::point_to_point::{plan_move, verify};
 use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
 use crate::transport::tcp::{LinkSettings, TcpLink};
-use arm_model::kinematics::tool_speed_m_s;
 use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
-use shared_types::{Arming, FaultCode, MonotonicNs, OperatingMode};
+use shared_types::{FaultCode, MonotonicNs, OperatingMode};
 use std::collections::VecDeque;
 use std::time::Instant;
 
+/// Why nothing begins yet.
+pub(super) const SETTLES: &str = "a stop or a bring-up is under way; ask again";
 /// Largest distance of the held pose from the start of a plan (rad): 0.5 deg.
 const START_DISTANCE_MAX_RAD: f64 = 0.5 * core::f64::consts::PI / 180.0;
 /// Smaller distances need no move to the start (rad).
 const START_EQUAL_RAD: f64 = 1e-9;
-/// Longest time that an arming for setting up or wiggling lasts (ns): ten minutes.
-const ARMED_FOR_NS: u64 = 600_000_000_000;
-/// What the loop judges by, differences over a cycle, may be this part less than the speed.
-const SPEED_ROUNDING: f64 = 1e-3;
 /// Part of the limits used for that move.
 const TO_START_SPEED_PART: f64 = 0.05;
 
@@ -43,7 +39,7 @@ impl Bridge {
             }
             // The mode is that of before: what is on its way to the loop may undo a stop.
             ControllerRequest::Bringup | ControllerRequest::Acknowledge if self.settles() => {
-                self.wrong_mode(&call, "a stop or a bring-up is under way; ask again");
+                self.wrong_mode(&call, SETTLES);
             }
             ControllerRequest::Bringup => match self.mode() {
                 ControllerMode::Idle => answer(&call, &ControllerEvent::Done),
@@ -60,8 +56,8 @@ impl Bridge {
             }
             ControllerRequest::Arm {
                 operating_mode,
-                area_clear,
-            } => self.serve_arming(call, operating_mode, area_clear),
+                confirmed_ns,
+            } => self.serve_arming(call, operating_mode, confirmed_ns),
             ControllerRequest::Disarm => match self.command(ControlCommand::Disarm, None) {
                 Ok(()) => {
                     // With its next cycle.
@@ -107,31 +103,13 @@ impl Bridge {
         );
     }
 
-    fn wrong_mode(&self, call: &ControllerCall, why: &str) {
+    pub(super) fn wrong_mode(&self, call: &ControllerCall, why: &str) {
         let message = format!("the controller is {:?}: {why}", self.mode());
         refuse(call, FaultCode::WrongMode, &message);
     }
 
-    /// Hands an arming to the loop, which answers. Throws expire sooner there.
-    fn serve_arming(
-        &mut self,
-        call: ControllerCall,
-        operating_mode: OperatingMode,
-        area_clear: bool,
-    ) {
-        if self.mode() != ControllerMode::Idle {
-            return self.wrong_mode(&call, "it is armed when it is Idle");
-        }
-        let arming = Arming {
-            operating_mode,
-            expires_ns: now_ns().saturating_add(ARMED_FOR_NS),
-            area_clear,
-        };
-        self.pass_on(call, ControlCommand::Arm(arming), None, Awaited::Armed);
-    }
-
     /// Hands a command to the loop; what it `awaits` will answer the call.
-    fn pass_on(
+    pub(super) fn pass_on(
         &mut self,
         call: ControllerCall,
         command: ControlCommand,
@@ -196,63 +174,36 @@ impl Bridge {
         Ok((q, link))
     }
 
-    /// Whether a motion may be asked for; refuses the call otherwise.
-    fn may_move(&self, call: &ControllerCall) -> bool {
+    /// What a motion that is asked for may run under; refuses the call otherwise.
+    fn may_move(&self, call: &ControllerCall) -> Option<OperatingMode> {
         if self.mode() != ControllerMode::Idle {
             self.wrong_mode(call, "motions begin when it is Idle");
-        } else if self.moves() {
-            refuse(call, FaultCode::WrongMode, "another motion is under way");
-        } else {
-            return true;
+            return None;
         }
-        false
+        if self.settles() {
+            self.wrong_mode(call, SETTLES);
+            return None;
+        }
+        if self.moves() {
+            refuse(call, FaultCode::WrongMode, "another motion is under way");
+            return None;
+        }
+        self.armed(call)
     }
 
     fn serve_move(&mut self, call: ControllerCall, q: JointVector, speed_fraction: f64) {
-        if !self.may_move(&call) {
+        let Some(armed) = self.may_move(&call) else {
             return;
-        }
-        let planned = plan_move(&self.newest.q_c, &q, speed_fraction, &self.limits)
-            .map_err(|error| (error.fault, error.to_string()))
-            .and_then(|motion| self.keeps_armed_speed(&motion).map(|()| motion));
+        };
+        let from = self.newest.q_c;
+        let planned = match self.armed_speed(armed) {
+            Some(speed) => speed.plan_move(&from, &q, speed_fraction),
+            None => plan_move(&from, &q, speed_fraction, &self.limits)
+                .map_err(|error| (error.fault, error.to_string())),
+        };
         match planned {
             Ok(motion) => self.begin(call, Box::new(motion), VecDeque::new()),
             Err((fault, detail)) => refuse(&call, fault, &detail),
-        }
-    }
-
-    /// Refuses a motion whose tool is faster than it is armed for: the loop would brake it on
-    /// its way.
-    fn keeps_armed_speed(&self, motion: &Motion) -> Result<(), (FaultCode, String)> {
-        // What is not armed the loop refuses.
-        let Some(armed) = self
-            .operating_mode
-            .filter(|_| self.settings.arming_required)
-        else {
-            return Ok(());
-        };
-        let is_move = matches!(motion, Motion::Move { .. });
-        let limit_m_s = self.limits.tcp_speed_max_m_s;
-        let most_m_s = self.settings.tool_speed_max_m_s(is_move, armed, limit_m_s);
-        let period_s = self.limits.period_s();
-        let cycles = (motion.duration_s() / period_s).ceil() as u32;
-        let tool_m_s = |cycle: u32| {
-            let t_s = f64::from(cycle) * period_s;
-            let state = motion.state_at(t_s);
-            let speed_m_s = tool_speed_m_s(&state.q, &state.qd, &self.limits.tcp_offset());
-            (speed_m_s, t_s)
-        };
-        let fastest = (0..=cycles)
-            .map(tool_m_s)
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        match fastest {
-            Some((top_m_s, at_s)) if top_m_s > most_m_s * (1.0 + SPEED_ROUNDING) => {
-                let detail = format!(
-                    "the tool would reach {top_m_s:.3} m/s after {at_s:.2} s, armed for {armed:?} it may move at {most_m_s:.3}: move more slowly, or arm for more"
-                );
-                Err((FaultCode::OperatingModeExceeded, detail))
-            }
-            _ => Ok(()),
         }
     }
 
@@ -262,10 +213,13 @@ impl Bridge {
         trajectory: &JointTrajectory,
         sha256: &[u8; 32],
     ) {
-        if !self.may_move(&call) {
+        let Some(armed) = self.may_move(&call) else {
             return;
-        }
-        match self.admit_plan(trajectory, sha256) {
+        };
+        let admitted = self
+            .still_confirmed(armed)
+            .and_then(|()| self.admit_plan(armed, trajectory, sha256));
+        match admitted {
             Ok(mut motions) => match motions.pop_front() {
                 Some(first) => self.begin(call, first, motions),
                 None => refuse(&call, FaultCode::PlanOutOfLimits, ""),
@@ -277,6 +231,7 @@ impl Bridge {
     /// Checks a plan; the motions it takes, a small move to its start included.
     fn admit_plan(
         &self,
+        armed: OperatingMode,
         trajectory: &JointTrajectory,
         sha256: &[u8; 32],
     ) -> Result<VecDeque<Box<Motion>>, (FaultCode, String)> {
@@ -312,7 +267,10 @@ impl Bridge {
             .map_err(|e| (FaultCode::StartPoseMismatch, e.to_string()))?;
             motions.push_back(Box::new(to_start));
         }
-        self.keeps_armed_speed(&motion)?;
+        if let Some(speed) = self.armed_speed(armed) {
+            let kept = speed.check(&motion);
+            kept.map_err(|detail| (FaultCode::OperatingModeExceeded, detail))?;
+        }
         motions.push_back(Box::new(motion));
         Ok(motions)
     }

@@ -17,7 +17,7 @@ use crate::config::ControllerConfig;
 use crate::session::{ArmSession, SessionError};
 use crate::xarm::{ArmState, ArmVersion, Command, JointQuery, Mode, ReplyData, StateRequest};
 use arm_model::{JointVector, Limits};
-use shared_types::FaultCode;
+use shared_types::{CommandInterface, FaultCode};
 use std::time::{Duration, Instant};
 
 /// The arm stands when two poses read this far apart in time ...
@@ -57,6 +57,10 @@ pub struct SetUp<'a> {
     /// The limits that it names.
     pub limits: &'a Limits,
 }
+
+/// An arm that stands closer than this to what it is commanded holds it (deg): the step that it
+/// takes if its own word for that is an old one.
+const HELD_WITHIN_DEG: f64 = 0.1;
 
 /// Takes every step that was done: its name and its result.
 pub type OnStep<'a> = &'a mut dyn FnMut(&'static str, &str);
@@ -121,11 +125,15 @@ impl SetUp<'_> {
         self.read_all_back(mode)?;
         let effect = format!("ready, mode {mode:?}, all joints enabled");
         reported("read back", &effect);
-        let q = wait_still(session)?;
+        let stands = wait_still(session)?;
         reported("still", "the arm stands");
-        match self.limits.position_violation(&q) {
-            Some(j) => {
-                let (joint, q_rad) = (j.saturating_add(1), q[j]);
+        let interface = self.config.command_interface;
+        let (q, hold) = pose_to_hold(session, stands, interface)?;
+        reported("hold", &hold);
+        let violation = |q: &JointVector| self.limits.position_violation(q).map(|j| (j, q[j]));
+        match violation(&stands).or_else(|| violation(&q)) {
+            Some((j, q_rad)) => {
+                let joint = j.saturating_add(1);
                 let message = format!(
                     "joint {joint} stands at {q_rad:.4} rad, outside its range: move it back with the vendor's tool"
                 );
@@ -207,4 +215,25 @@ fn wait_still(session: &mut ArmSession) -> Result<JointVector, SetUpError> {
     }
     let message = "the arm does not stand still: stop other programs that move it";
     refuse(FaultCode::ArmNotReady, message.to_owned())
+}
+
+/// The pose to hold (rad), in words too: by positions what the arm is commanded to hold if it
+/// stands there, since a joint that droops would be let down by each bring-up that held the
+/// measured pose; else where it stands. Joint velocities would draw the arm to any other pose.
+fn pose_to_hold(
+    session: &mut ArmSession,
+    stands: JointVector,
+    interface: CommandInterface,
+) -> Result<(JointVector, String), SetUpError> {
+    let asked = session.ask(&Command::JointPosition(JointQuery::Commanded))?;
+    let ReplyData::Joints(commanded) = asked else {
+        return Ok((stands, "where it stands".to_owned()));
+    };
+    let off_deg = (commanded - stands).max_abs().to_degrees();
+    if interface == CommandInterface::ServoPosition && off_deg <= HELD_WITHIN_DEG {
+        let hold = format!("as commanded, {off_deg:.3} deg from where it stands");
+        return Ok((commanded, hold));
+    }
+    let hold = format!("where it stands, {off_deg:.3} deg from what it was commanded");
+    Ok((stands, hold))
 }

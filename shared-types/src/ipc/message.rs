@@ -181,13 +181,16 @@ pub enum ControllerRequest {
         /// [`crate::plan::trajectory_hash`] of it.
         sha256: [u8; 32],
     },
-    /// Allow motions of an operating mode: a throw once, begun within ten seconds, and only
-    /// with a clear area; the others for ten minutes. Any stop disarms.
+    /// Allow motions of an operating mode: set-up motions for ten minutes, a wiggle or a throw
+    /// that begins within ten seconds of the confirmation. Any stop disarms.
     Arm {
         /// What for.
         operating_mode: OperatingMode,
-        /// The operator declared that nobody is within reach of arm and rope.
-        area_clear: bool,
+        /// When the operator confirmed that nobody is within reach of arm and rope
+        /// (CLOCK_MONOTONIC, ns). Wiggles and throws need it: at most ten seconds old, and
+        /// given since the arm came to rest, which is checked again when they begin. For a
+        /// simulated arm a program may confirm; the controller cannot tell.
+        confirmed_ns: Option<u64>,
     },
     /// Allow no motion any more; one that runs is braked.
     Disarm,
@@ -317,7 +320,7 @@ pub enum ControllerEvent {
 pub struct ControllerRpc;
 
 impl Rpc for ControllerRpc {
-    const NAME: &'static str = "wag/v1/controller/control";
+    const NAME: &'static str = "wag/v2/controller/control";
     type Request = ControllerRequest;
     type Event = ControllerEvent;
     fn is_last(event: &ControllerEvent) -> bool {

@@ -29,21 +29,37 @@ pub struct ArmArgs {
     pub address: Option<IpAddr>,
     #[command(flatten)]
     pub ports: ArmPorts,
-    /// The area is clear and the emergency stop is in reach. Asked for unless this is given
-    /// or the arm proves that it is simulated.
+    /// The area is clear and the emergency stop is in reach for the bring-up and the move to
+    /// the start pose. Asked for unless this is given or the arm proves that it is simulated.
+    /// In the start pose a real arm's motion is confirmed at standard input all the same.
     #[arg(long, alias = "confirm")]
     pub yes: bool,
+    /// Ask as for a real arm where the arm is simulated, too: a rehearsal.
+    #[arg(long)]
+    pub ask: bool,
+    /// Who operates the arm, for the run's record. Default: the user's name.
+    #[arg(long, value_name = "NAME")]
+    pub operator: Option<String>,
     /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
     #[arg(long)]
     pub limits: Option<PathBuf>,
+    /// How the arm follows its setpoints, as written by `wag latency` (TOML): its joints are
+    /// compared with that. A real arm needs it for a wiggle or a throw; default:
+    /// arm-response.toml in the folder of configurations (~/.config/wag).
+    #[arg(long, value_name = "FILE")]
+    pub arm_response: Option<PathBuf>,
     /// Check the motion against the limits and stop there: connects to nothing,
     /// needs no --arm.
     #[arg(long)]
     pub dry_run: bool,
-    /// Use standard input as a dead-man switch: the arm moves only until Enter is
-    /// pressed or standard input ends.
+    /// Use standard input as a dead-man switch, as for every real arm: the arm moves only until
+    /// Enter is pressed or standard input ends.
     #[arg(long)]
     pub dead_man: bool,
+    /// Use standard input as a hold-to-run control: the arm moves only while Enter is held down
+    /// (or a button's driver sends empty lines, at least every 0.3 s).
+    #[arg(long, conflicts_with = "dead_man")]
+    pub hold_to_run: bool,
 }
 
 #[derive(Debug, Args)]

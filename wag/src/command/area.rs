@@ -1,11 +1,17 @@
-//! The area around a real arm: nothing moves before somebody says that it is
-//! clear.
+//! What a motion of an arm stands on before it is brought up: which arm answers, how it follows,
+//! who operates it, and that somebody says that the area is clear.
 
 use crate::cli::ArmArgs;
+use crate::config;
 use crate::pipeline::ArmAddress;
+use anyhow::Context;
 use cli_output::{OrInput, Outcome, output};
+use rt_controller::config::measured_lags;
 use rt_controller::session::ArmSession;
+use run_log::files;
 use std::io::{BufRead, IsTerminal, Write, stdin, stdout};
+use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Longest wait for an arm that is asked whether it is simulated.
@@ -16,7 +22,7 @@ const WAIT: Duration = Duration::from_secs(2);
 ///
 /// # Errors
 /// Nobody is there.
-fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
+pub fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
     let Some(ip) = arm.address.filter(|_| !arm.dry_run) else {
         return Ok(None);
     };
@@ -32,7 +38,83 @@ fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
         joints: ports.report_port,
         status: [ports.status_port; 2],
         simulated,
+        arm_response: None,
     }))
+}
+
+/// The same, and how its joints follow their setpoints, for motions that are fast enough for a
+/// lag to look like a jammed joint.
+///
+/// # Errors
+/// Nobody is there, or the arm is real and was not measured.
+pub fn reach_measured(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
+    let Some(address) = reach(arm)? else {
+        return Ok(None);
+    };
+    let named = arm.arm_response.clone();
+    let places: Vec<PathBuf> = config::arm_response_files().or_input()?.collect();
+    let here = || {
+        let mut there = places
+            .iter()
+            .filter(|file| file.try_exists().unwrap_or(true));
+        there.next().cloned().filter(|_| !address.simulated)
+    };
+    let Some(path) = named.clone().or_else(here) else {
+        if address.simulated {
+            return Ok(Some(address));
+        }
+        let place = places.first().map_or_else(String::new, |file| {
+            format!(" --response '{}'", file.display())
+        });
+        return Err(bad_input!(
+            "how this arm follows its setpoints was not measured, and its lag could look like a jammed joint: run `wag latency --arm {}{place}` first",
+            address.ip
+        ));
+    };
+    let response = files::read_arm_response(&path).or_input()?;
+    let shown = path.display();
+    measured_lags(&response)
+        .map_err(anyhow::Error::from)
+        .with_context(|| format!("`{shown}`"))
+        .or_input()?;
+    let of = response.source.strip_prefix("arm ");
+    let of = of.and_then(|place| place.parse::<SocketAddr>().ok());
+    if named.is_none() && of.is_some_and(|of| of.ip() != address.ip) {
+        return Err(bad_input!(
+            "`{shown}` tells of the {}, not of the arm at {}: measure this one, or name the file with --arm-response",
+            response.source,
+            address.ip
+        ));
+    }
+    let path = std::path::absolute(&path).or_input()?;
+    let arm_response = Some((path, response));
+    Ok(Some(ArmAddress {
+        arm_response,
+        ..address
+    }))
+}
+
+/// Whether somebody must say that the area is clear.
+pub const fn asks(arm: &ArmArgs, address: &ArmAddress) -> bool {
+    arm.ask || !address.simulated
+}
+
+/// Who operates the arm.
+///
+/// # Errors
+/// Nobody is named, and the arm is real.
+pub fn operator(arm: &ArmArgs, address: &ArmAddress) -> Outcome<Option<String>> {
+    let user = || {
+        let mut keys = ["USER", "LOGNAME"].iter();
+        keys.find_map(|key| std::env::var(key).ok())
+            .filter(|_| asks(arm, address))
+    };
+    let named = arm.operator.clone().or_else(user);
+    let named = named.filter(|name| !name.trim().is_empty());
+    if named.is_none() && !address.simulated {
+        return Err(bad_input!("name who operates the arm with --operator NAME"));
+    }
+    Ok(named)
 }
 
 /// Whether somebody is there to type the word.
@@ -40,26 +122,28 @@ const fn can_ask(terminal: bool, json: bool) -> bool {
     terminal && !json
 }
 
-/// Makes sure that the area around the arm is clear for a motion called `word`:
-/// by `--yes`, or by the operator who types the word. A simulated arm is in nobody's way.
-/// Returns the arm; `None` for a dry run.
-pub fn require_clear_area(arm: &ArmArgs, word: &str) -> Outcome<Option<ArmAddress>> {
-    let reached = reach(arm)?;
-    let Some(address) = reached.filter(|a| !a.simulated && !arm.yes) else {
-        return Ok(reached);
-    };
+/// Makes sure that the area around the arm is clear before it is brought up: by `--yes`, or by
+/// the operator who types `word`. A simulated arm is in nobody's way.
+pub fn require_clear_area(arm: &ArmArgs, address: &ArmAddress, word: &str) -> Outcome {
+    if arm.yes || !asks(arm, address) {
+        return Ok(());
+    }
     let refuse = |why: &str| {
+        let (ip, port) = (address.ip, address.command);
+        let asked = if address.simulated {
+            "--ask asks as for a real arm".to_owned()
+        } else {
+            format!("{ip}:{port} does not prove that it is a simulated arm")
+        };
         Err(bad_input!(
-            "{}:{} does not prove that it is a simulated arm: clear the area, keep the emergency stop in reach, and {why}",
-            address.ip,
-            address.command
+            "{asked}: clear the area, keep the emergency stop in reach, and {why}"
         ))
     };
     if !can_ask(stdin().is_terminal(), output::is_json()) {
         return refuse("add --yes");
     }
     print!(
-        "The arm will move. Emergency stop in reach, nobody within reach of arm and rope?\n\
+        "The arm will be enabled and move to its start. Emergency stop in reach, nobody within reach of arm and rope?\n\
          Area clear: type {word} "
     );
     stdout().flush().or_failed()?;
@@ -68,7 +152,7 @@ pub fn require_clear_area(arm: &ArmArgs, word: &str) -> Outcome<Option<ArmAddres
     if line.trim() != word {
         return refuse(&format!("type {word}; nothing has moved"));
     }
-    Ok(reached)
+    Ok(())
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 use super::bench_rt::percentiles;
 use crate::cli::BenchArgs;
 use crate::config;
-use crate::pipeline::{self, RunFolder};
+use crate::pipeline::{self, BringUp, RunFolder};
 use crate::session::Session;
 use anyhow::{Context, ensure};
 use arm_model::{JointTrajectory, Limits};
@@ -103,20 +103,20 @@ fn measure(
     stage: &Stage,
 ) -> anyhow::Result<([Vec<CycleRecord>; 2], u64)> {
     let (_, address) = pipeline::start_rig(session, folder, rig)?;
-    let arm = pipeline::start_controller(session, folder, limits, address)?;
-    pipeline::acquire(session, &arm)?;
+    let arm = pipeline::start_controller(session, folder, limits, &address)?;
+    pipeline::acquire(session, &arm, &mut BringUp::default())?;
     let mut cycles = [Vec::new(), Vec::new()];
     let mut file_bytes = 0;
     for block in 0..2 * pairs {
         stage.say(format!("{} of {}", block + 1, 2 * pairs));
-        pipeline::arm_for(session, &arm, OperatingMode::SetUp)?;
+        pipeline::arm_for(session, &arm, OperatingMode::SetUp, None)?;
         pipeline::move_to(session, &arm, motion.start(), MOVE_SPEED)?;
         let with = matches!(block % 4, 1 | 2);
         if with {
             let camera = rig.camera.stereo_camera();
             pipeline::start_recorder(session, folder, limits, Some(&camera), rig.target_m)?;
         }
-        pipeline::arm_for(session, &arm, OperatingMode::Wiggle)?;
+        pipeline::arm_simulated(session, &arm, OperatingMode::Wiggle)?;
         session.received.drain()?;
         session.received.cycles.cycles.clear();
         pipeline::execute(session, &arm, motion)?;

@@ -7,7 +7,7 @@ mod summary;
 use super::runs::explain_stop;
 use crate::cli::DemoArgs;
 use crate::config;
-use crate::pipeline::{self, ArmLink, RunFolder, execute};
+use crate::pipeline::{self, ArmLink, BringUp, RunFolder, execute};
 use crate::session::Session;
 use anyhow::{Context, anyhow, bail};
 use arm_model::{JointTrajectory, Limits};
@@ -180,7 +180,7 @@ impl<'a> Demo<'a> {
         };
         let ping = &PlannerRequest::Ping;
         let planner = pipeline::start(session, folder, "planner", &config, ping)?;
-        let arm = pipeline::start_controller(session, folder, &limits, address)?;
+        let arm = pipeline::start_controller(session, folder, &limits, &address)?;
         record.stages.start_s = stage.done("rig, controller, camera and planner are up");
         Ok(Self {
             folder,
@@ -230,9 +230,10 @@ impl<'a> Demo<'a> {
     /// Enables the arm, moves to the start pose, waits for the rope.
     fn bring_up(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<()> {
         let stage = Stage::begin("bring-up");
-        self.record.warnings = pipeline::acquire(self.session, &self.arm)?;
-        // The arm is simulated: nobody needs to be asked.
-        pipeline::arm_for(self.session, &self.arm, OperatingMode::SetUp)?;
+        let mut found = BringUp::default();
+        pipeline::acquire(self.session, &self.arm, &mut found)?;
+        self.record.warnings = found.warnings;
+        pipeline::arm_for(self.session, &self.arm, OperatingMode::SetUp, None)?;
         pipeline::move_to(self.session, &self.arm, wiggle.start(), MOVE_SPEED)?;
         let still = self.wait_still(&stage)?;
         self.record.stages.bringup_s = stage.done(if still {
@@ -290,7 +291,7 @@ impl<'a> Demo<'a> {
     /// Streams the wiggle and films it.
     fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
         let stage = Stage::begin("wiggle");
-        pipeline::arm_for(self.session, &self.arm, OperatingMode::Wiggle)?;
+        pipeline::arm_simulated(self.session, &self.arm, OperatingMode::Wiggle)?;
         let film = self.film(WIGGLE_FRAMES, wiggle, false, &stage)?;
         self.record.set_wiggle(film);
         self.record.stages.wiggle_s =
@@ -301,7 +302,7 @@ impl<'a> Demo<'a> {
     /// Throws once, open loop, filmed.
     fn throw(&mut self, plan: &Plan) -> anyhow::Result<Film> {
         let stage = Stage::begin("throw");
-        pipeline::arm_for(self.session, &self.arm, OperatingMode::Throw)?;
+        pipeline::arm_simulated(self.session, &self.arm, OperatingMode::Throw)?;
         // Empties the histograms, so that they hold this throw alone.
         pipeline::latency(self.session, &self.arm)?;
         let film = self.film(THROW_FRAMES, &plan.trajectory, true, &stage)?;

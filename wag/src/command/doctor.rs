@@ -3,7 +3,7 @@
 use super::network::network;
 use crate::cli::ArmPorts;
 use crate::config;
-use crate::doctor::{Finding, Machine, Verdict, judge_line, settings};
+use crate::doctor::{Finding, Machine, Verdict, inputs, judge_line, settings};
 use arm_model::Limits;
 use cli_output::{OrInput, Outcome, output, table};
 use rt_controller::ControllerConfig;
@@ -25,12 +25,15 @@ pub fn run(address: Option<IpAddr>, ports: &ArmPorts) -> Outcome<Option<Value>> 
         }
         findings.extend(line);
         if answers {
-            let wanted = config::here::<ControllerConfig>(None)
-                .or_input()?
-                .arm_settings;
+            let config: ControllerConfig = config::here(None).or_input()?;
             let tool_m = limits.tcp_offset_m;
-            let status = SocketAddr::new(ip, ports.status_port);
-            findings.push(settings(status, &wanted, tool_m));
+            let at = |port| SocketAddr::new(ip, port);
+            findings.push(settings(
+                at(ports.status_port),
+                &config.arm_settings,
+                tool_m,
+            ));
+            findings.push(inputs(at(ports.command_port), config.enabling_input));
         }
     }
     let is_failed = |f: &&Finding| f.verdict == Verdict::Fail;

@@ -52,8 +52,9 @@ pub fn tell(
              1. ask whether the area is clear, unless --yes says so or the arm is simulated\n  \
              2. connect to {address} (ports {}, {}, {}), read its settings and compare them with the limits\n  \
              3. move it at set-up speed to the start pose {} rad\n  \
-             4. arm it for one {name} and send it for {duration_s:.2} s, {:.0} setpoints a second\n  \
-             5. disarm it, and keep the record of every cycle in the run's folder",
+             4. ask again, unless the arm is simulated: a word typed in the start pose confirms\n  \
+             5. arm it for one {name} and send it for {duration_s:.2} s, {:.0} setpoints a second\n  \
+             6. disarm it, and keep the record of every cycle in the run's folder",
         arm.ports.command_port,
         arm.ports.report_port,
         arm.ports.status_port,

@@ -1,10 +1,11 @@
 //! Work on an arm from its bring-up to the end of its record: what throw, wiggle and
 //! latency have in common.
 
+use super::area::{asks, operator};
 use super::runs::explain_stop;
 use crate::cli::ArmArgs;
-use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
-use crate::session::Session;
+use crate::pipeline::{self, ArmAddress, ArmLink, BringUp, RunFolder};
+use crate::session::{Session, Switch};
 use arm_model::{JointVector, Limits};
 use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use run_log::{Cycles, files};
@@ -31,17 +32,21 @@ pub fn on_arm(
     conclude: impl FnOnce(&Path, Cycles, Value) -> anyhow::Result<Value>,
 ) -> Outcome<(PathBuf, Value)> {
     watch_interrupts().or_failed()?;
+    let operator = operator(arm, &address)?;
     let folder = RunFolder::create(out, name)?;
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    if arm.dead_man {
-        session.hold_dead_man().or_failed()?;
+    if arm.hold_to_run {
+        session.watch_operator(Switch::HoldToRun).or_failed()?;
+    } else if arm.dead_man || asks(arm, &address) {
+        session.watch_operator(Switch::DeadMan).or_failed()?;
     }
+    let mut found = BringUp::default();
     let worked = |session: &mut Session| -> anyhow::Result<Value> {
-        let (link, warnings) = bring_up(session, &folder, address, limits, start)?;
+        let link = bring_up(session, &folder, &address, limits, start, &mut found)?;
         let mut value = work(session, &link)?;
         value["ok"] = true.into();
         value["run"] = json!(folder.path());
-        value["warnings"] = json!(warnings);
+        value["warnings"] = json!(found.warnings);
         Ok(value)
     };
     let result = worked(&mut session);
@@ -54,6 +59,9 @@ pub fn on_arm(
         Err(e) => json!({ "ok": false, "error": format!("{e:#}") }),
     };
     summary["epoch_ns"] = epoch_ns.into();
+    summary["operator"] = json!(operator);
+    let step = |(step, result): &(String, String)| json!({ "step": step, "result": result });
+    summary["bring_up"] = found.steps.iter().map(step).collect();
     let kept = files::write_json(&folder.file(files::SUMMARY), &summary);
     let recorded = session.finish_run_file();
     explain_stop(folder.path());
@@ -63,29 +71,27 @@ pub fn on_arm(
     Ok((folder.path().to_owned(), value))
 }
 
-/// Starts everything and moves to the start pose; also returns what the real-time set-up
-/// could not get.
+/// Starts everything and moves to the start pose; what was `found` on the way.
 fn bring_up(
     session: &mut Session,
     folder: &RunFolder,
-    address: ArmAddress,
+    address: &ArmAddress,
     limits: &Limits,
     start: JointVector,
-) -> anyhow::Result<(ArmLink, Vec<String>)> {
+    found: &mut BringUp,
+) -> anyhow::Result<ArmLink> {
     let stage = Stage::begin("bring-up");
     pipeline::start_recorder(session, folder, limits, None, None)?;
     let link = pipeline::start_controller(session, folder, limits, address)?;
-    let warnings = pipeline::acquire(session, &link)?;
-    for warning in &warnings {
+    pipeline::acquire(session, &link, found)?;
+    for warning in &found.warnings {
         tracing::warn!("{warning}");
     }
-    stage.say("moving to the start pose");
-    pipeline::arm_for(session, &link, OperatingMode::SetUp)?;
+    stage.done("arm enabled");
+    session.await_hold()?;
+    let stage = Stage::begin("start pose");
+    pipeline::arm_for(session, &link, OperatingMode::SetUp, None)?;
     pipeline::move_to(session, &link, start, MOVE_SPEED)?;
-    stage.done(if address.simulated {
-        "arm stands at the start; simulated, so it is armed without asking"
-    } else {
-        "arm stands at the start"
-    });
-    Ok((link, warnings))
+    stage.done("arm stands at the start");
+    Ok(link)
 }

@@ -1,6 +1,6 @@
 //! `wag throw`: execute a plan on an arm, once, open loop, with latencies.
 
-use super::area::require_clear_area;
+use super::area::{asks, reach_measured, require_clear_area};
 use super::dry_run;
 use super::on_arm::on_arm;
 use super::plan::LOOK;
@@ -9,12 +9,47 @@ use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
 use crate::pipeline::{self, ArmAddress, ArmLink};
 use crate::session::Session;
-use arm_model::{JointTrajectory, Limits};
+use arm_model::{JOINTS, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
+use rt_controller::armed_speed::ArmedSpeed;
+use rt_controller::control::{Motion, OperatingModeSpeeds};
+use rt_controller::os::now_ns;
 use run_log::files::read_plan;
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
 use std::path::Path;
+
+/// Refuses a motion of a real arm in joints of which nobody knows how they follow.
+fn require_measured_joints(
+    address: &ArmAddress,
+    trajectory: &JointTrajectory,
+    name: &str,
+) -> Outcome {
+    let Some((path, response)) = address.arm_response.as_ref().filter(|_| !address.simulated)
+    else {
+        return Ok(());
+    };
+    let moves = |j: usize| {
+        let way = trajectory.extrema(j);
+        way.q_max.value - way.q_min.value > STILL_RAD
+    };
+    let unknown: Vec<String> = (0..JOINTS)
+        .filter(|j| moves(*j) && response.joints[*j].lag().is_none())
+        .map(|j| (j + 1).to_string())
+        .collect();
+    if unknown.is_empty() {
+        return Ok(());
+    }
+    Err(bad_input!(
+        "the {name} moves joint {}, of which `{}` does not tell how it follows: measure it with `wag latency --arm {} --excitation FILE` in a pose where it may move fast enough",
+        unknown.join(", "),
+        path.display(),
+        address.ip
+    ))
+}
+
+/// Joints that move by less stand still to the controller's monitors (rad).
+const STILL_RAD: f64 = 0.02;
 
 /// Moves to a trajectory's start and streams it, armed for `operating_mode`; returns what was
 /// measured. Without an `address` it must be a dry run.
@@ -26,9 +61,9 @@ pub fn drive(
     out: Option<&Path>,
     operating_mode: OperatingMode,
 ) -> Outcome<Option<Value>> {
-    let name = match operating_mode {
-        OperatingMode::Throw => "throw",
-        OperatingMode::Wiggle | OperatingMode::SetUp => "wiggle",
+    let (name, word) = match operating_mode {
+        OperatingMode::Throw => ("throw", "THROW"),
+        OperatingMode::Wiggle | OperatingMode::SetUp => ("wiggle", "WIGGLE"),
     };
     if let Some(worst) = limits.worst_violation(trajectory) {
         return Err(bad_input!(
@@ -36,24 +71,42 @@ pub fn drive(
             worst.describe()
         ));
     }
+    let pole = config::cell().or_input()?.pole;
+    let armed = ArmedSpeed {
+        armed: operating_mode,
+        limits,
+        pole: &pole,
+        speeds: OperatingModeSpeeds::default(),
+    };
+    let slow_enough = armed.check(&Motion::Spline(*trajectory));
+    slow_enough.map_err(|why| bad_input!("the {name} is too fast: {why}"))?;
     if arm.dry_run {
         return dry_run::tell(arm, limits, trajectory, name).map(Some);
     }
     let Some(address) = address else {
         return Err(bad_input!("name the arm with --arm ADDR"));
     };
+    require_measured_joints(&address, trajectory, name)?;
     let start = trajectory.start();
+    let is_asked = asks(arm, &address);
     let work = |session: &mut Session, link: &ArmLink| {
+        let confirmed_ns = is_asked.then(|| session.confirm(word)).transpose()?;
+        session.await_hold()?;
         let stage = Stage::begin("stream");
         pipeline::latency(session, link)?;
-        pipeline::arm_for(session, link, operating_mode)?;
+        // A simulated arm is in nobody's way.
+        let confirmed = confirmed_ns.unwrap_or_else(now_ns);
+        pipeline::arm_for(session, link, operating_mode, Some(confirmed))?;
         let span = pipeline::execute(session, link, trajectory)?;
         let latency = pipeline::latency(session, link)?;
         stage.done(&format!(
             "{} cycles, {} missed, reply p99 {:.0} µs",
             latency.cycles, latency.missed, latency.reply.p99_us
         ));
-        Ok(json!({ "start_ns": span.start_ns, "end_ns": span.end_ns, "latency": latency }))
+        Ok(json!({
+            "start_ns": span.start_ns, "end_ns": span.end_ns, "confirmed_ns": confirmed_ns,
+            "latency": latency,
+        }))
     };
     let place = (out, name);
     let (folder, value) = on_arm(arm, address, limits, start, place, work, |_, _, value| {
@@ -67,7 +120,10 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
     let plan = read_plan(&args.plan).or_input()?;
     confirm(&plan.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
     config::cell_for(&plan).or_input()?;
-    let address = require_clear_area(&args.arm, "THROW")?;
+    let address = reach_measured(&args.arm)?;
+    if let Some(address) = &address {
+        require_clear_area(&args.arm, address, "MOVE")?;
+    }
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let run = drive(
         &args.arm,

@@ -1,6 +1,6 @@
 //! `wag wiggle`: the probing motion, written to a file or executed.
 
-use super::area::require_clear_area;
+use super::area::{reach_measured, require_clear_area};
 use super::throw::drive;
 use super::wiggle_design;
 use crate::cli::WiggleArgs;
@@ -22,7 +22,10 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
             "choose what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it, --evaluate reports its information"
         ));
     }
-    let address = require_clear_area(&args.arm, "WIGGLE")?;
+    let address = reach_measured(&args.arm)?;
+    if let Some(address) = &address {
+        require_clear_area(&args.arm, address, "MOVE")?;
+    }
     let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
     let config = config::here::<PlannerConfig>(None).or_input()?.wiggle;
     let trajectory = wiggle(&config, &limits).or_failed()?;

@@ -16,6 +16,9 @@ use shared_types::Plan;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+/// Name of the file that says how an arm follows its setpoints.
+pub const RESPONSE_FILE: &str = "arm-response.toml";
+
 /// The file of the cell that the command line names.
 static CELL_FILE: OnceLock<PathBuf> = OnceLock::new();
 
@@ -75,6 +78,14 @@ pub fn layers(kind: Kind, run: Option<&Path>) -> anyhow::Result<Layers> {
 pub fn here<T: Configured>(run: Option<&Path>) -> anyhow::Result<T> {
     let config: T = layers(T::KIND, run)?.get()?;
     Ok(config.in_cell(cell()?))
+}
+
+/// Where the file that tells how the arm of this place follows its setpoints is looked for: a
+/// rig's folder goes before a site's.
+pub fn arm_response_files() -> anyhow::Result<impl Iterator<Item = PathBuf>> {
+    let Folders { site, rig } = Folders::here()?;
+    let folders = [rig, site].into_iter().flatten();
+    Ok(folders.map(|folder| folder.join(RESPONSE_FILE)))
 }
 
 /// Refuses to begin with files that cannot be read as what they configure.

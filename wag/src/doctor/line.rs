@@ -2,6 +2,7 @@
 
 use super::{Finding, Verdict};
 use rt_controller::arm_settings::{ArmSettings, summary};
+use rt_controller::config::EnablingInput;
 use rt_controller::session::ArmSession;
 use rt_controller::set_up::{Headroom, ToolSpeed, read_status};
 use rt_controller::xarm::{ArmVersion, Command, Firmware, ReplyData};
@@ -124,6 +125,32 @@ pub fn settings(status: SocketAddr, wanted: &ArmSettings, tool_m: [f64; 3]) -> F
     )
 }
 
+/// Levels of the digital inputs of an arm's control box, and whether the enabling switch among
+/// them is held.
+pub fn inputs(command: SocketAddr, enabling: Option<EnablingInput>) -> Finding {
+    let name = "digital inputs";
+    let read = ArmSession::connect(command, WAIT).and_then(|mut arm| arm.digital_inputs());
+    let levels = match read {
+        Ok(levels) => levels,
+        Err(reason) => {
+            let verdict = Verdict::fail_unless(enabling.is_none());
+            return Finding::new(name, verdict, reason.to_string(), "see the row of the arm");
+        }
+    };
+    let eight = |from: u16| -> String {
+        let high = |i: u16| levels >> i & 1 != 0;
+        let bits = (from..from + 8).map(|i| if high(i) { '1' } else { '0' });
+        bits.collect()
+    };
+    let switch = match enabling {
+        None => "no enabling switch configured",
+        Some(input) if input.is_held(levels) => "enabling switch held",
+        Some(_) => "enabling switch not held",
+    };
+    let found = format!("CI0-7 {}, DI0-7 {}; {switch}", eight(0), eight(8));
+    Finding::new(name, Verdict::Pass, found, "")
+}
+
 /// Judges sorted round trips.
 fn round_trips(sorted_us: &[f64]) -> Option<Finding> {
     let max = sorted_us.last()?;
@@ -172,6 +199,14 @@ mod tests {
         assert!(found.remedy.contains("1.000 kg"), "{found:?}");
         assert!(found.remedy.contains("self-collision"), "{found:?}");
         assert_eq!(settings(at(9), &any, [0.0; 3]).verdict, Verdict::Fail);
+        // Its inputs are open, that is high.
+        let command = at(arm.ports().command);
+        for (held_high, word) in [(true, "switch held"), (false, "not held")] {
+            let number = 9;
+            let found = inputs(command, Some(EnablingInput { number, held_high }));
+            assert!(found.found.contains(word), "{found:?}");
+            assert!(found.found.starts_with("CI0-7 11111111"), "{found:?}");
+        }
         // Its tool speed limit is 1.2 m/s.
         for (plans_m_s, verdict) in [
             (1.0, Verdict::Pass),

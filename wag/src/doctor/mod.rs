@@ -4,7 +4,7 @@
 mod line;
 mod machine;
 
-pub use line::{judge_line, settings};
+pub use line::{inputs, judge_line, settings};
 pub use machine::Machine;
 
 use serde::Serialize;

@@ -3,12 +3,16 @@
 use crate::session::Session;
 use anyhow::{anyhow, ensure};
 use arm_model::{JointTrajectory, JointVector};
+use rt_controller::os::now_ns;
 use shared_types::OperatingMode;
 use shared_types::ipc::message::{
     ControllerEvent, ControllerRequest, ControllerRpc, LatencyReport,
 };
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::plan::trajectory_hash;
+
+/// Longest move to a start pose: at set-up speed a far one takes its time.
+const MOVED_WITHIN_S: f64 = 600.0;
 
 pub type ArmLink = RpcClient<ControllerRpc>;
 
@@ -44,19 +48,6 @@ fn refusal(what: &str, event: &ControllerEvent) -> anyhow::Error {
     }
 }
 
-/// Asks for what is simply done.
-fn command(
-    session: &mut Session,
-    arm: &ArmLink,
-    what: &str,
-    request: &ControllerRequest,
-    within_s: f64,
-) -> anyhow::Result<()> {
-    let event = session.ask(arm, request, within_s, |_| ())?;
-    ensure!(event == ControllerEvent::Done, refusal(what, &event));
-    Ok(())
-}
-
 /// Asks for a motion and waits for its end.
 fn motion(
     session: &mut Session,
@@ -65,36 +56,69 @@ fn motion(
     request: &ControllerRequest,
     within_s: f64,
 ) -> anyhow::Result<MotionSpan> {
-    match session.ask(arm, request, within_s, |_| ())? {
+    session.await_hold()?;
+    let event = session.ask(arm, request, within_s, |_| ());
+    session.end_hold();
+    match event? {
         ControllerEvent::Finished { start_ns, end_ns } => Ok(MotionSpan { start_ns, end_ns }),
         other => Err(refusal(what, &other)),
     }
 }
 
-/// Takes the operator's place, connects the arm and enables it. Returns what
-/// the controller's real-time set-up could not get.
-pub fn acquire(session: &mut Session, arm: &ArmLink) -> anyhow::Result<Vec<String>> {
+/// What a bring-up found.
+#[derive(Debug, Default)]
+pub struct BringUp {
+    /// Each step and its result: versions, settings as read, errors that were cleared.
+    pub steps: Vec<(String, String)>,
+    /// What the operator should know: real-time properties that could not be had, settings of
+    /// the arm that are allowed but unwise.
+    pub warnings: Vec<String>,
+}
+
+/// Takes the operator's place, connects the arm and enables it; what was `found` on the way,
+/// also when it is refused.
+pub fn acquire(session: &mut Session, arm: &ArmLink, found: &mut BringUp) -> anyhow::Result<()> {
     session.take_operator()?;
-    let bring_up = ControllerRequest::Bringup;
-    command(session, arm, "to bring up the arm", &bring_up, 20.0)?;
+    let done = session.ask(arm, &ControllerRequest::Bringup, 20.0, |event| {
+        if let ControllerEvent::Step { name, result } = event {
+            found.steps.push((name.clone(), result.clone()));
+        }
+    })?;
+    let is_done = done == ControllerEvent::Done;
+    ensure!(is_done, refusal("to bring up the arm", &done));
     match session.ask(arm, &ControllerRequest::Status, 5.0, |_| ())? {
-        ControllerEvent::Status { warnings, .. } => Ok(warnings),
+        ControllerEvent::Status { warnings, .. } => {
+            found.warnings = warnings;
+            Ok(())
+        }
         other => Err(refusal("to report its state", &other)),
     }
 }
 
-/// Arms the controller for motions of an operating mode. Whoever calls this has made sure
-/// that the area is clear, or that the arm is simulated.
+/// Arms the controller for motions of an operating mode. For a wiggle or a throw the operator
+/// has confirmed at `confirmed_ns` that the area is clear, or the arm is simulated.
 pub fn arm_for(
     session: &mut Session,
     arm: &ArmLink,
     operating_mode: OperatingMode,
+    confirmed_ns: Option<u64>,
 ) -> anyhow::Result<()> {
     let request = ControllerRequest::Arm {
         operating_mode,
-        area_clear: true,
+        confirmed_ns,
     };
-    command(session, arm, "to arm", &request, 5.0)
+    let event = session.ask(arm, &request, 5.0, |_| ())?;
+    ensure!(event == ControllerEvent::Done, refusal("to arm", &event));
+    Ok(())
+}
+
+/// The same for a simulated arm, which is in nobody's way.
+pub fn arm_simulated(
+    session: &mut Session,
+    arm: &ArmLink,
+    operating_mode: OperatingMode,
+) -> anyhow::Result<()> {
+    arm_for(session, arm, operating_mode, Some(now_ns()))
 }
 
 /// Moves jerk-limited to a pose.
@@ -105,7 +129,8 @@ pub fn move_to(
     speed_fraction: f64,
 ) -> anyhow::Result<MotionSpan> {
     let request = ControllerRequest::MoveTo { q, speed_fraction };
-    motion(session, arm, "the move to the start pose", &request, 60.0)
+    let what = "the move to the start pose";
+    motion(session, arm, what, &request, MOVED_WITHIN_S)
 }
 
 /// Streams a trajectory to its end.

@@ -5,6 +5,8 @@ mod arm;
 mod processes;
 mod run_folder;
 
-pub use arm::{ArmLink, MotionSpan, acquire, arm_for, execute, latency, move_to};
+pub use arm::{
+    ArmLink, BringUp, MotionSpan, acquire, arm_for, arm_simulated, execute, latency, move_to,
+};
 pub use processes::{ArmAddress, rig_config, start, start_controller, start_recorder, start_rig};
 pub use run_folder::RunFolder;

@@ -4,16 +4,17 @@ use super::{ArmLink, RunFolder};
 use crate::config;
 use crate::session::{ProcessSpec, Session};
 use anyhow::bail;
-use arm_model::Limits;
+use arm_model::{ArmResponse, Limits};
 use rig_sim::RigConfig;
 use rt_controller::ControllerConfig;
 use rt_controller::arm_settings::ArmSettings;
 use rt_controller::config::OnDifference;
 use run_log::RecorderConfig;
-use shared_types::StereoCamera;
 use shared_types::ipc::message::{ControllerRequest, RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::{Rpc, RpcClient};
+use shared_types::{CommandInterface, StereoCamera};
 use std::net::{IpAddr, Ipv4Addr};
+use std::path::PathBuf;
 
 /// The demo's rig: a set-up with this run's domain and seed, free ports, a target.
 pub fn rig_config(folder: &RunFolder, rig: &RigConfig, seed: u64, target_m: [f64; 3]) -> RigConfig {
@@ -85,6 +86,7 @@ pub fn start_rig(
                 joints,
                 status: [rich, normal],
                 simulated: true,
+                arm_response: None,
             };
             Ok((rig, address))
         }
@@ -94,7 +96,7 @@ pub fn start_rig(
 }
 
 /// Where an arm listens.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct ArmAddress {
     pub ip: IpAddr,
     pub command: u16,
@@ -104,6 +106,8 @@ pub struct ArmAddress {
     pub status: [u16; 2],
     /// Whether it is the simulated arm.
     pub simulated: bool,
+    /// How it follows its setpoints, where that is known, and the file that tells it.
+    pub arm_response: Option<(PathBuf, ArmResponse)>,
 }
 
 /// Starts the controller for an arm, and its guardian.
@@ -111,7 +115,7 @@ pub fn start_controller(
     session: &mut Session,
     folder: &RunFolder,
     limits: &Limits,
-    arm: ArmAddress,
+    arm: &ArmAddress,
 ) -> anyhow::Result<ArmLink> {
     let config = folder.config("rt-controller", &controller_config(folder, limits, arm)?)?;
     for name in ["rt-controller", "guardian"] {
@@ -128,7 +132,7 @@ pub fn start_controller(
 fn controller_config(
     folder: &RunFolder,
     limits: &Limits,
-    arm: ArmAddress,
+    arm: &ArmAddress,
 ) -> anyhow::Result<ControllerConfig> {
     let shipped: ControllerConfig = config::here(None)?;
     let mut config = ControllerConfig {
@@ -138,6 +142,13 @@ fn controller_config(
         report_port: arm.joints,
         status_ports: arm.status,
         simulated: arm.simulated,
+        pole: config::cell()?.pole,
+        // It was measured by positions.
+        arm_response_file: arm
+            .arm_response
+            .as_ref()
+            .filter(|_| shipped.command_interface == CommandInterface::ServoPosition)
+            .map(|(path, _)| path.clone()),
         limits: Some(limits.clone()),
         ..shipped
     };
@@ -152,8 +163,10 @@ fn controller_config(
         config.thresholds.late_cycles_max = Some(50);
         // Nobody configured it, so nobody needs to look.
         config.on_difference = OnDifference::Set;
-        // What a laboratory wants of its own arm is not wanted of a simulated one.
+        // What a laboratory wants of its own arm is not wanted of a simulated one, which has no
+        // switch either.
         config.arm_settings = ArmSettings::default();
+        config.enabling_input = None;
     }
     Ok(config)
 }

@@ -1,8 +1,9 @@
 //! The session a command works in: shared memory, supervised processes, the
 //! operator's heartbeat, what is received, and the file of the run.
 
-use super::{DeadMan, ProcessSpec, Received, RunFile, Supervisor};
-use anyhow::bail;
+use super::presence::{Presence, Switch};
+use super::{ProcessSpec, Received, RunFile, Supervisor};
+use anyhow::{bail, ensure};
 use cli_output::is_interrupted;
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
@@ -15,8 +16,8 @@ pub struct Session {
     // Order matters: the heartbeat ends before the processes, the processes
     // before the connection to shared memory, and that before the sweep.
     operator: Option<OperatorEnd>,
-    /// The operator's dead-man switch, where there is one.
-    dead_man: Option<DeadMan>,
+    /// The operator at standard input, where somebody must be there.
+    presence: Option<Presence>,
     /// A motion runs that nobody but the controller is needed for.
     committed: bool,
     supervisor: Supervisor,
@@ -31,6 +32,10 @@ pub struct Session {
 
 /// How long a process may take to come up (s).
 const STARTUP_S: f64 = 15.0;
+/// Longest wait for the operator, with the arm enabled.
+const CONFIRMED_WITHIN: Duration = Duration::from_secs(120);
+/// Pause between two turns.
+const TURN: Duration = Duration::from_millis(5);
 const BEAT_EVERY: Duration = Duration::from_millis(20);
 /// Two and a half periods of the reports that have the arm's codes (5 Hz).
 const CODES_WITHIN: Duration = Duration::from_millis(500);
@@ -41,7 +46,7 @@ impl Session {
         let bus = Bus::join(domain)?;
         Ok(Self {
             operator: None,
-            dead_man: None,
+            presence: None,
             committed: false,
             supervisor: Supervisor::default(),
             received: Received::open(&bus)?,
@@ -67,11 +72,78 @@ impl Session {
         self.run_file.take().map_or(Ok(()), RunFile::finish)
     }
 
-    /// Makes standard input the operator's dead-man switch, held from now on.
-    pub fn hold_dead_man(&mut self) -> anyhow::Result<()> {
-        self.dead_man = Some(DeadMan::hold()?);
-        println!("Enter lets go of the dead-man switch; Ctrl-C stops as well");
+    /// From now on the arm moves only as the operator at standard input lets it.
+    pub fn watch_operator(&mut self, switch: Switch) -> anyhow::Result<()> {
+        self.presence = Some(Presence::at_standard_input(switch)?);
+        eprintln!(
+            "{}; Ctrl-C stops as well",
+            match switch {
+                Switch::DeadMan => "Enter lets go of the dead-man switch",
+                Switch::HoldToRun => "the arm moves only while Enter is held down",
+            }
+        );
         Ok(())
+    }
+
+    /// Asks the operator whether the area is clear; when `word` confirmed it (CLOCK_MONOTONIC,
+    /// ns).
+    ///
+    /// # Errors
+    /// Something else was typed, or nothing, or nobody is there.
+    pub fn confirm(&mut self, word: &'static str) -> anyhow::Result<u64> {
+        let Some(presence) = &mut self.presence else {
+            bail!("nobody is watched who could confirm");
+        };
+        presence.request(word);
+        eprint!(
+            "The arm stands at the start. Emergency stop in reach, nobody within reach of arm and rope?\n\
+             Area clear: type {word} "
+        );
+        let began = Instant::now();
+        while began.elapsed() < CONFIRMED_WITHIN {
+            self.tick()?;
+            let Some(presence) = &mut self.presence else {
+                break;
+            };
+            if let Some(at) = presence.confirmed() {
+                return Ok(at.0);
+            }
+            ensure!(
+                !presence.is_let_go(),
+                "the area was not confirmed clear: type {word} when it is asked for, and nothing else; run the command again"
+            );
+            std::thread::sleep(TURN);
+        }
+        bail!("nobody typed {word} within 120 s; run the command again")
+    }
+
+    /// Waits until the operator holds what must be held while the arm moves, if anything.
+    pub fn await_hold(&mut self) -> anyhow::Result<()> {
+        let lets_move = |session: &mut Self| match &mut session.presence {
+            // What is let go the controller refuses, in its own words.
+            Some(presence) => presence.lets_move() || presence.is_let_go(),
+            None => true,
+        };
+        if lets_move(self) {
+            return Ok(());
+        }
+        eprintln!("Hold Enter down: the arm moves while it is held");
+        let began = Instant::now();
+        while began.elapsed() < CONFIRMED_WITHIN {
+            self.tick()?;
+            if lets_move(self) {
+                return Ok(());
+            }
+            std::thread::sleep(TURN);
+        }
+        bail!("nobody held Enter down within 120 s; nothing moved for it")
+    }
+
+    /// The motion is over: what was held may be released.
+    pub fn end_hold(&mut self) {
+        if let Some(presence) = &mut self.presence {
+            presence.rests();
+        }
     }
 
     pub fn start(&mut self, spec: &ProcessSpec) -> anyhow::Result<()> {
@@ -82,7 +154,7 @@ impl Session {
     /// for. Fails when a process died or the user pressed Ctrl-C.
     pub fn tick(&mut self) -> anyhow::Result<()> {
         if let Some(operator) = &mut self.operator {
-            if self.dead_man.as_ref().is_some_and(DeadMan::is_let_go) {
+            if self.presence.as_mut().is_some_and(Presence::is_let_go) {
                 operator.let_go();
             } else if self.last_beat.elapsed() >= BEAT_EVERY {
                 operator.beat();
@@ -109,7 +181,7 @@ impl Session {
         let began = Instant::now();
         while began.elapsed() < duration {
             self.tick()?;
-            std::thread::sleep(Duration::from_millis(5));
+            std::thread::sleep(TURN);
         }
         Ok(())
     }

@@ -1,13 +1,13 @@
 //! A running set of processes: started, watched, recorded, ended together.
 
-mod dead_man;
 mod live;
+mod presence;
 mod received;
 mod run_file;
 mod supervisor;
 
-use dead_man::DeadMan;
 pub use live::Session;
+pub use presence::Switch;
 use received::Received;
 use run_file::RunFile;
 pub use run_file::remedy;

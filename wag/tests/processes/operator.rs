@@ -2,11 +2,15 @@
 
 use super::shell::{arm, on_arm, recorded, said};
 use crate::support::{refused_in, send, until};
+use arm_model::response::{Estimate, JointResponse, TrackingLag};
+use arm_model::{ArmResponse, JOINTS};
 use rustix::process::Signal;
+use serde_json::Value;
 use shared_types::FaultCode;
+use shared_types::ipc::{ControllerMode, CycleRecord};
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::time::Duration;
 use xarm_sim::SimulatedArm;
@@ -80,27 +84,150 @@ fn a_dead_man_switch_that_is_not_held_moves_nothing() {
     );
 }
 
-/// Through a tunnel an arm answers at this machine's address. With a serial number of the
-/// vendor's it is real, and nothing begins before somebody declares the area clear.
+/// Reads what a child says to people up to `words`.
+fn read_until(child: &mut Child, words: &str) -> String {
+    let stderr = child.stderr.as_mut().unwrap();
+    let (mut text, mut byte) = (Vec::new(), [0]);
+    while !text.ends_with(words.as_bytes()) {
+        let n = stderr.read(&mut byte).unwrap();
+        assert_eq!(n, 1, "{}", String::from_utf8_lossy(&text));
+        text.extend(byte);
+    }
+    String::from_utf8(text).unwrap()
+}
+
+/// A wiggle that asks as a real arm's does, up to the question in the start pose.
+fn rehearsed(arm: &SimulatedArm, run: &Path) -> Child {
+    let line = "wiggle --ask --yes --operator Ada";
+    let mut child = on_arm(arm, line, run)
+        .stdin(Stdio::piped())
+        .spawn()
+        .unwrap();
+    read_until(&mut child, "type WIGGLE ");
+    child
+}
+
 #[test]
-fn an_arm_behind_a_tunnel_needs_a_clear_area() {
+fn a_rehearsal_is_confirmed_in_the_start_pose_and_its_record_says_by_whom() {
+    let folder = tempfile::tempdir().unwrap();
+    let (arm, run) = (arm(), folder.path().join("run"));
+    let mut child = rehearsed(&arm, &run);
+    child
+        .stdin
+        .as_mut()
+        .unwrap()
+        .write_all(b"WIGGLE\n")
+        .unwrap();
+    let stdin = child.stdin.take();
+    let (code, said) = said(child);
+    assert_eq!(code, Some(0), "{said}");
+    drop(stdin);
+    let summary = std::fs::read_to_string(run.join("summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(summary["operator"], "Ada", "{summary:#}");
+    let at = |key: &str| summary[key].as_u64().unwrap();
+    assert!(at("confirmed_ns") < at("start_ns"), "{summary:#}");
+    let steps = summary["bring_up"].as_array().unwrap();
+    let named = |name: &str| steps.iter().any(|s| s["step"] == name);
+    assert!(named("identify") && named("enable"), "{summary:#}");
+}
+
+#[test]
+fn another_word_in_the_start_pose_moves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (arm, run) = (arm(), folder.path().join("run"));
+    let mut child = rehearsed(&arm, &run);
+    child
+        .stdin
+        .as_mut()
+        .unwrap()
+        .write_all(b"wiggle\n")
+        .unwrap();
+    let stdin = child.stdin.take();
+    let (code, said) = said(child);
+    drop(stdin);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("not confirmed clear"), "{said}");
+    let (cycles, _) = recorded(&run);
+    let streamed = |c: &CycleRecord| c.mode == ControllerMode::Streaming as u8;
+    assert!(!cycles.iter().any(streamed), "no motion began");
+}
+
+#[test]
+fn a_key_that_is_released_brakes_the_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let (arm, run) = (arm(), folder.path().join("run"));
+    let mut child = on_arm(&arm, "wiggle --hold-to-run", &run)
+        .stdin(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut key = child.stdin.take().unwrap();
+    until("the motion", Duration::from_secs(60), || {
+        key.write_all(b"\n").unwrap();
+        let sample = arm.history().latest()?;
+        (sample.state.qd.max_abs() > AT_SPEED_RAD_S).then_some(())
+    });
+    was_braked(&arm, child, &run, FaultCode::DeadManReleased);
+    drop(key);
+}
+
+/// What `wag latency` would have written of an arm at this machine's address.
+fn response(folder: &Path) -> PathBuf {
+    let known = |value: f64| Estimate {
+        value,
+        interval: [value, value],
+    };
+    let lag = TrackingLag {
+        dead_time_s: known(0.008),
+        natural_frequency_hz: known(25.0),
+        damping_ratio: known(0.9),
+        residual_rad: 1e-5,
+        samples: 900,
+    };
+    let response = ArmResponse {
+        version: "0".to_owned(),
+        source: "arm 127.0.0.1:502".to_owned(),
+        command_to_target_s: None,
+        excitation: None,
+        joints: [JointResponse::Excited(lag); JOINTS],
+    };
+    let path = folder.join("arm-response.toml");
+    run_log::files::write_arm_response(&path, &response).unwrap();
+    path
+}
+
+/// Through a tunnel an arm answers at this machine's address. With a serial number of the
+/// vendor's it is real: nothing begins before it was measured, and before somebody says that
+/// the area is clear.
+#[test]
+fn an_arm_behind_a_tunnel_is_measured_and_needs_a_clear_area() {
     let arm = arm();
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let port = listener.local_addr().unwrap().port();
     let arm_port = arm.ports().command;
     let tunnel = std::thread::spawn(move || {
-        let (mut near, _) = listener.accept().unwrap();
-        let mut far = TcpStream::connect((Ipv4Addr::LOCALHOST, arm_port)).unwrap();
-        let mut bytes = [0; 256];
-        let n = near.read(&mut bytes).unwrap();
-        far.write_all(&bytes[..n]).unwrap();
-        let n = far.read(&mut bytes).unwrap();
-        let at = bytes.windows(9).position(|w| w == b"SIMULATED").unwrap();
-        bytes[at..at + 9].copy_from_slice(b"XS1305000");
-        near.write_all(&bytes[..n]).unwrap();
+        for _ in 0..2 {
+            let (mut near, _) = listener.accept().unwrap();
+            let mut far = TcpStream::connect((Ipv4Addr::LOCALHOST, arm_port)).unwrap();
+            let mut bytes = [0; 256];
+            let n = near.read(&mut bytes).unwrap();
+            far.write_all(&bytes[..n]).unwrap();
+            let n = far.read(&mut bytes).unwrap();
+            let at = bytes.windows(9).position(|w| w == b"SIMULATED").unwrap();
+            bytes[at..at + 9].copy_from_slice(b"XS1305000");
+            near.write_all(&bytes[..n]).unwrap();
+        }
     });
     let folder = tempfile::tempdir().unwrap();
+    let measured = tempfile::tempdir().unwrap();
     let line = format!("wiggle --arm 127.0.0.1 --command-port {port}");
+    let said = refused_in(folder.path(), 2, &line);
+    assert!(
+        said.contains("not measured") && said.contains("wag latency --arm 127.0.0.1"),
+        "{said}"
+    );
+    let response = response(measured.path());
+    let line = format!("{line} --arm-response {}", response.display());
     let said = refused_in(folder.path(), 2, &line);
     assert!(
         said.contains("does not prove") && said.contains("--yes"),

@@ -6,7 +6,7 @@ use super::summary::{Film, Settled, Tracked};
 use crate::command::network::warning_of_pole;
 use crate::command::plan::describe;
 use crate::command::unconfirmed::confirm;
-use crate::pipeline::execute;
+use crate::pipeline::{arm_simulated, execute};
 use anyhow::{anyhow, bail, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use cli_output::Stage;
@@ -16,7 +16,7 @@ use planner::settle::SettleRequest;
 use rt_controller::os::now_ns;
 use run_log::files;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, RopeAppearance};
-use shared_types::{MonotonicNs, Plan, RopeEstimate, Task};
+use shared_types::{MonotonicNs, OperatingMode, Plan, RopeEstimate, Task};
 use std::time::Duration;
 
 /// The joint that wiggles (0-based).
@@ -258,6 +258,7 @@ impl Demo<'_> {
         if left_s() < 0.0 {
             return Ok(None);
         }
+        arm_simulated(self.session, &self.arm, OperatingMode::Wiggle)?;
         let early = Duration::from_secs_f64((left_s() - 0.03).max(0.0));
         self.session.idle(early)?;
         std::thread::sleep(Duration::from_secs_f64(left_s().max(0.0)));

@@ -8,9 +8,6 @@ use run_log::{Cycles, Run, files};
 use shared_types::MonotonicNs;
 use std::path::{Path, PathBuf};
 
-/// File written into the run folder.
-pub(super) const RESPONSE_FILE: &str = "arm-response.toml";
-
 /// What was recorded, live or before.
 pub(super) struct Evidence {
     /// Arm or run.

@@ -2,7 +2,7 @@
 
 use super::evidence::Evidence;
 use crate::cli::LatencyArgs;
-use crate::command::area::require_clear_area;
+use crate::command::area::{asks, reach, require_clear_area};
 use crate::command::on_arm::on_arm;
 use crate::config;
 use crate::pipeline;
@@ -13,6 +13,7 @@ use cli_output::{OrInput, Outcome, Stage};
 use planner::arm_response::excitation::sweep;
 use run_log::files;
 use serde_json::{Value, json};
+use shared_types::OperatingMode;
 use std::time::Duration;
 
 /// Rest before and after each sweep, so that every joint starts and ends at rest.
@@ -62,13 +63,16 @@ pub(super) fn measure(
     conclude: impl FnOnce(&Evidence) -> anyhow::Result<Value>,
 ) -> Outcome<Value> {
     let (limits, excitation, sweeps) = intent(args)?;
-    let Some(address) = require_clear_area(&args.arm, "MEASURE")? else {
+    let Some(address) = reach(&args.arm)? else {
         return Err(bad_input!("name the arm with --arm ADDR"));
     };
+    require_clear_area(&args.arm, &address, "MOVE")?;
+    let is_asked = asks(&args.arm, &address);
     let Some((_, first)) = sweeps.first() else {
         return Err(bad_input!("name a joint with --joints"));
     };
     let place = (args.out.as_deref(), "latency");
+    let source = format!("arm {}:{}", address.ip, address.command);
     let (_, found) = on_arm(
         &args.arm,
         address,
@@ -76,6 +80,11 @@ pub(super) fn measure(
         first.start(),
         place,
         |session, link| {
+            if is_asked {
+                session.confirm("MEASURE")?;
+                pipeline::arm_for(session, link, OperatingMode::SetUp, None)?;
+            }
+            session.await_hold()?;
             let stage = Stage::begin("sweep");
             for (place, (joint, sweep)) in sweeps.iter().enumerate() {
                 stage.say(format!("joint {joint} ({} of {})", place + 1, sweeps.len()));
@@ -87,7 +96,6 @@ pub(super) fn measure(
             Ok(json!({}))
         },
         |folder, cycles, mut reported| {
-            let source = format!("arm {}:{}", address.ip, address.command);
             let mut found = conclude(&Evidence {
                 excitation: Some(excitation),
                 ..Evidence::of(source, folder, cycles)

@@ -11,10 +11,11 @@ mod show;
 pub use show::loop_table;
 
 use crate::cli::LatencyArgs;
+use crate::config::RESPONSE_FILE;
 use anyhow::Context;
 use arm_model::{ArmResponse, JOINTS};
 use cli_output::{OrInput, Outcome, Stage};
-use evidence::{Evidence, RESPONSE_FILE};
+use evidence::Evidence;
 use planner::arm_response::delay::command_to_target;
 use planner::arm_response::identify;
 use rt_controller::bridge::Latencies;

@@ -1,6 +1,7 @@
 //! The result for people and for programs.
 
-use super::evidence::{Evidence, RESPONSE_FILE};
+use super::evidence::Evidence;
+use crate::config::RESPONSE_FILE;
 use arm_model::response::{Estimate, NotExcited};
 use arm_model::{ArmResponse, JointResponse};
 use cli_output::table;
