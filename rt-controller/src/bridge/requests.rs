@@ -12,7 +12,7 @@ use arm_model::{JointTrajectory, JointVector};
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, MonotonicNs, OperatingMode};
+use shared_types::{FaultCode, MonotonicNs};
 use std::collections::VecDeque;
 use std::time::Instant;
 
@@ -174,25 +174,25 @@ impl Bridge {
         Ok((q, link))
     }
 
-    /// What a motion that is asked for may run under; refuses the call otherwise.
-    fn may_move(&self, call: &ControllerCall) -> Option<OperatingMode> {
+    /// Whether a motion may be asked for; refuses the call otherwise.
+    fn may_move(&self, call: &ControllerCall) -> bool {
         if self.mode() != ControllerMode::Idle {
             self.wrong_mode(call, "motions begin when it is Idle");
-            return None;
-        }
-        if self.settles() {
+        } else if self.settles() {
             self.wrong_mode(call, SETTLES);
-            return None;
-        }
-        if self.moves() {
+        } else if self.moves() {
             refuse(call, FaultCode::WrongMode, "another motion is under way");
-            return None;
+        } else {
+            return true;
         }
-        self.armed(call)
+        false
     }
 
     fn serve_move(&mut self, call: ControllerCall, q: JointVector, speed_fraction: f64) {
-        let Some(armed) = self.may_move(&call) else {
+        if !self.may_move(&call) {
+            return;
+        }
+        let Some(armed) = self.armed(&call) else {
             return;
         };
         let from = self.newest.q_c;
@@ -213,25 +213,31 @@ impl Bridge {
         trajectory: &JointTrajectory,
         sha256: &[u8; 32],
     ) {
-        let Some(armed) = self.may_move(&call) else {
+        if !self.may_move(&call) {
+            return;
+        }
+        let mut motions = match self.admit_plan(trajectory, sha256) {
+            Ok(motions) => motions,
+            Err((fault, detail)) => return refuse(&call, fault, &detail),
+        };
+        let Some(armed) = self.armed(&call) else {
             return;
         };
-        let admitted = self
-            .still_confirmed(armed)
-            .and_then(|()| self.admit_plan(armed, trajectory, sha256));
-        match admitted {
-            Ok(mut motions) => match motions.pop_front() {
-                Some(first) => self.begin(call, first, motions),
-                None => refuse(&call, FaultCode::PlanOutOfLimits, ""),
-            },
-            Err((fault, detail)) => refuse(&call, fault, &detail),
+        let speed = self.armed_speed(armed);
+        let fits = self.still_confirmed(armed).and_then(|()| {
+            let kept = speed.map_or(Ok(()), |speed| speed.check(&Motion::Spline(*trajectory)));
+            kept.map_err(|detail| (FaultCode::OperatingModeExceeded, detail))
+        });
+        match (fits, motions.pop_front()) {
+            (Ok(()), Some(first)) => self.begin(call, first, motions),
+            (Ok(()), None) => refuse(&call, FaultCode::PlanOutOfLimits, ""),
+            (Err((fault, detail)), _) => refuse(&call, fault, &detail),
         }
     }
 
     /// Checks a plan; the motions it takes, a small move to its start included.
     fn admit_plan(
         &self,
-        armed: OperatingMode,
         trajectory: &JointTrajectory,
         sha256: &[u8; 32],
     ) -> Result<VecDeque<Box<Motion>>, (FaultCode, String)> {
@@ -266,10 +272,6 @@ impl Bridge {
             )
             .map_err(|e| (FaultCode::StartPoseMismatch, e.to_string()))?;
             motions.push_back(Box::new(to_start));
-        }
-        if let Some(speed) = self.armed_speed(armed) {
-            let kept = speed.check(&motion);
-            kept.map_err(|detail| (FaultCode::OperatingModeExceeded, detail))?;
         }
         motions.push_back(Box::new(motion));
         Ok(motions)
