@@ -10,7 +10,7 @@ use crate::control::monitor::prediction::{DEAD_TIME_MAX_S, MeasuredLag, Measured
 use crate::os::RealTimeSettings;
 use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
 use arm_model::{ArmResponse, Limits, Pole};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use shared_types::CommandInterface;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
@@ -117,9 +117,19 @@ impl Default for ControllerConfig {
 #[serde(deny_unknown_fields)]
 pub struct EnablingInput {
     /// Number of the input: 0 to 7 for CI0 to CI7, 8 to 15 for DI0 to DI7.
+    #[serde(deserialize_with = "input_number")]
     pub number: u8,
     /// Level of the input while the switch is held. A broken wire must give the other one.
     pub held_high: bool,
+}
+
+fn input_number<'de, D: Deserializer<'de>>(from: D) -> Result<u8, D::Error> {
+    let number = u8::deserialize(from)?;
+    if number < 16 {
+        return Ok(number);
+    }
+    let refused = format_args!("the number of an input is {number}, it must be 0 to 15");
+    Err(serde::de::Error::custom(refused))
 }
 
 impl EnablingInput {
@@ -268,9 +278,6 @@ impl ControllerConfig {
                 )));
             }
         }
-        if let Some(EnablingInput { number, .. }) = self.enabling_input {
-            require(number < 16, "enabling_input.number", number, "0 to 15")?;
-        }
         let warm_up_us = self.real_time.warm_up_us;
         let holds = warm_up_us <= WARM_UP_MAX_US;
         require(holds, "real_time.warm_up_us", warm_up_us, "0 to 1000 us")?;
@@ -342,15 +349,14 @@ mod tests {
             ("real_time.priority = 5", "11 to 99"),
             ("real_time.warm_up_us = 1001", "1000"),
             ("arm_settings.collision_sensitivity = 6", "off"),
-            (
-                "enabling_input = { number = 16, held_high = false }",
-                "0 to 15",
-            ),
         ] {
             let said = parse(text).unwrap().check().unwrap_err().to_string();
             let (key, _) = text.split_once(' ').unwrap();
             assert!(said.contains(key) && said.contains(allowed), "{said}");
         }
+        let input = parse("enabling_input = { number = 16, held_high = false }");
+        let input = input.unwrap_err().to_string();
+        assert!(input.contains("16, it must be 0 to 15"), "{input}");
         let config = ControllerConfig {
             limits: Some(Limits::default()),
             limits_file: Some("x".into()),

@@ -44,7 +44,7 @@ pub struct ArmArgs {
     #[arg(long)]
     pub limits: Option<PathBuf>,
     /// How the arm follows its setpoints, as written by `wag latency` (TOML): its joints are
-    /// compared with that. A real arm needs it for a wiggle or a throw; default:
+    /// compared with that. A real arm needs it for a wiggle or a throw; its default is
     /// arm-response.toml in the folder of configurations (~/.config/wag).
     #[arg(long, value_name = "FILE")]
     pub arm_response: Option<PathBuf>,

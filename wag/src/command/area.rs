@@ -5,13 +5,14 @@ use crate::cli::ArmArgs;
 use crate::config;
 use crate::pipeline::ArmAddress;
 use anyhow::Context;
+use arm_model::ArmResponse;
 use cli_output::{OrInput, Outcome, output};
 use rt_controller::config::measured_lags;
 use rt_controller::session::ArmSession;
 use run_log::files;
 use std::io::{BufRead, IsTerminal, Write, stdin, stdout};
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Longest wait for an arm that is asked whether it is simulated.
@@ -48,6 +49,9 @@ pub fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
 /// # Errors
 /// Nobody is there, or the arm is real and was not measured.
 pub fn reach_measured(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
+    if let Some(named) = &arm.arm_response {
+        response_of(named)?;
+    }
     let Some(address) = reach(arm)? else {
         return Ok(None);
     };
@@ -71,12 +75,8 @@ pub fn reach_measured(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
             address.ip
         ));
     };
-    let response = files::read_arm_response(&path).or_input()?;
+    let response = response_of(&path)?;
     let shown = path.display();
-    measured_lags(&response)
-        .map_err(anyhow::Error::from)
-        .with_context(|| format!("`{shown}`"))
-        .or_input()?;
     let of = response.source.strip_prefix("arm ");
     let of = of.and_then(|place| place.parse::<SocketAddr>().ok());
     if named.is_none() && of.is_some_and(|of| of.ip() != address.ip) {
@@ -92,6 +92,20 @@ pub fn reach_measured(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
         arm_response,
         ..address
     }))
+}
+
+/// How an arm follows, from a file that the controller can use.
+fn response_of(path: &Path) -> Outcome<ArmResponse> {
+    let again = || {
+        let path = path.display();
+        format!("`{path}` is of no use: measure the arm again with `wag latency --arm ADDR`")
+    };
+    let response = files::read_arm_response(path)
+        .with_context(again)
+        .or_input()?;
+    let usable = measured_lags(&response).map_err(anyhow::Error::from);
+    usable.with_context(again).or_input()?;
+    Ok(response)
 }
 
 /// Whether somebody must say that the area is clear.
@@ -150,7 +164,10 @@ pub fn require_clear_area(arm: &ArmArgs, address: &ArmAddress, word: &str) -> Ou
     let mut line = String::new();
     stdin().lock().read_line(&mut line).or_failed()?;
     if line.trim() != word {
-        return refuse(&format!("type {word}; nothing has moved"));
+        return refuse(&format!(
+            "type {word}, in capitals; `{}` moves nothing",
+            line.trim()
+        ));
     }
     Ok(())
 }

@@ -4,9 +4,10 @@ use super::network::network;
 use crate::cli::ArmPorts;
 use crate::config;
 use crate::doctor::{Finding, Machine, Verdict, inputs, judge_line, settings};
-use arm_model::Limits;
+use arm_model::{JOINTS, Limits};
 use cli_output::{OrInput, Outcome, output, table};
 use rt_controller::ControllerConfig;
+use run_log::files;
 use serde_json::{Value, json};
 use std::net::{IpAddr, SocketAddr};
 
@@ -24,6 +25,7 @@ pub fn run(address: Option<IpAddr>, ports: &ArmPorts) -> Outcome<Option<Value>> 
             findings.iter_mut().for_each(Finding::require_of_a_real_arm);
         }
         findings.extend(line);
+        findings.push(response_finding(ip, is_real)?);
         if answers {
             let config: ControllerConfig = config::here(None).or_input()?;
             let tool_m = limits.tcp_offset_m;
@@ -48,6 +50,42 @@ pub fn run(address: Option<IpAddr>, ports: &ArmPorts) -> Outcome<Option<Value>> 
         "{failed} of {} checks failed; remedies are listed above",
         findings.len()
     ))
+}
+
+/// Whether it is known how the arm follows its setpoints; wiggles and throws of a real one are
+/// refused otherwise.
+fn response_finding(ip: IpAddr, is_real: bool) -> Outcome<Finding> {
+    let name = "arm response";
+    let mut places = config::arm_response_files().or_input()?;
+    let remedy = format!(
+        "measure it with `wag latency --arm {ip} --response FILE`, FILE being arm-response.toml in the folder of configurations"
+    );
+    let Some(path) = places.find(|file| file.try_exists().unwrap_or(true)) else {
+        let verdict = if is_real {
+            Verdict::Fail
+        } else {
+            Verdict::Pass
+        };
+        return Ok(Finding::new(
+            name,
+            verdict,
+            "not measured".to_owned(),
+            &remedy,
+        ));
+    };
+    let (verdict, found) = match files::read_arm_response(&path) {
+        Ok(response) => {
+            let known = response.joints.iter().filter(|j| j.lag().is_some());
+            let (known, source) = (known.count(), &response.source);
+            let found = format!(
+                "`{}`: {known} of {JOINTS} joints, of {source}",
+                path.display()
+            );
+            (Verdict::Pass, found)
+        }
+        Err(reason) => (Verdict::Fail, reason.to_string()),
+    };
+    Ok(Finding::new(name, verdict, found, &remedy))
 }
 
 /// Whether the network that reads a film can be loaded.

@@ -50,7 +50,7 @@ pub fn tell(
     println!(
         "dry run: nothing is connected, nothing moves. Without --dry-run wag would\n  \
              1. ask whether the area is clear, unless --yes says so or the arm is simulated\n  \
-             2. connect to {address} (ports {}, {}, {}), read its settings and compare them with the limits\n  \
+             2. connect to {address} (ports {}, {}, {}), read its settings and compare them with the limits; a real arm must have been measured (`wag latency`)\n  \
              3. move it at set-up speed to the start pose {} rad\n  \
              4. ask again, unless the arm is simulated: a word typed in the start pose confirms\n  \
              5. arm it for one {name} and send it for {duration_s:.2} s, {:.0} setpoints a second\n  \

@@ -5,7 +5,7 @@ use super::area::{asks, operator};
 use super::runs::explain_stop;
 use crate::cli::ArmArgs;
 use crate::pipeline::{self, ArmAddress, ArmLink, BringUp, RunFolder};
-use crate::session::{Session, Switch};
+use crate::session::{Confirmation, Session, Switch};
 use arm_model::{JointVector, Limits};
 use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use run_log::{Cycles, files};
@@ -40,6 +40,11 @@ pub fn on_arm(
     } else if arm.dead_man || asks(arm, &address) {
         session.watch_operator(Switch::DeadMan).or_failed()?;
     }
+    if arm.ask && address.simulated {
+        eprintln!(
+            "A rehearsal: the simulated arm has no enabling switch, takes the settings that it is given, and is compared with a measured response only if --arm-response names one"
+        );
+    }
     let mut found = BringUp::default();
     let worked = |session: &mut Session| -> anyhow::Result<Value> {
         let link = bring_up(session, &folder, &address, limits, start, &mut found)?;
@@ -60,6 +65,11 @@ pub fn on_arm(
     };
     summary["epoch_ns"] = epoch_ns.into();
     summary["operator"] = json!(operator);
+    let confirmed = |c: &Confirmation| {
+        let at = humantime::format_rfc3339_millis(c.at).to_string();
+        json!({ "word": c.word, "at_ns": c.at_ns, "at": at })
+    };
+    summary["confirmed"] = session.confirmed.iter().map(confirmed).collect();
     let step = |(step, result): &(String, String)| json!({ "step": step, "result": result });
     summary["bring_up"] = found.steps.iter().map(step).collect();
     let kept = files::write_json(&folder.file(files::SUMMARY), &summary);

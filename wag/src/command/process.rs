@@ -24,9 +24,16 @@ const FINISH_WITHIN: Duration = Duration::from_secs(19);
 /// The lowest priority there is.
 const LOWEST: i32 = 19;
 
-/// Sets the stop flag when the parent is gone, and ends the process if it does
-/// not manage to end itself.
-fn watch_parent(parent: Option<u32>, end_within: Duration) -> anyhow::Result<()> {
+/// How much longer than its parent a recorder lives: the controller then brakes.
+const OUTLIVES: Duration = Duration::from_secs(2);
+
+/// Sets the stop flag when the parent is gone, `outlives` later, and ends the process if it
+/// does not manage to end itself.
+fn watch_parent(
+    parent: Option<u32>,
+    outlives: Duration,
+    end_within: Duration,
+) -> anyhow::Result<()> {
     std::thread::Builder::new()
         .name("parent-watch".to_owned())
         .spawn(move || {
@@ -34,6 +41,7 @@ fn watch_parent(parent: Option<u32>, end_within: Duration) -> anyhow::Result<()>
                 std::thread::sleep(PARENT_EVERY);
                 if parent.is_some_and(|p| std::os::unix::process::parent_id() != p) {
                     tracing::warn!("the parent process is gone, ending");
+                    std::thread::sleep(outlives);
                     interrupted().store(true, Ordering::SeqCst);
                 }
                 if interrupted().load(Ordering::SeqCst) {
@@ -80,7 +88,11 @@ pub fn run(args: &ProcessArgs) -> Outcome {
         | ProcessName::Preview
         | ProcessName::Planner => END_WITHIN,
     };
-    watch_parent(args.parent, end_within).or_failed()?;
+    let outlives = match args.name {
+        ProcessName::Recorder => OUTLIVES,
+        _ => Duration::ZERO,
+    };
+    watch_parent(args.parent, outlives, end_within).or_failed()?;
     let stop = interrupted();
     // Dropped after everything of the process that uses the domain.
     let domain = read::<toml::Table>(args)?;

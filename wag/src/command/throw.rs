@@ -104,8 +104,7 @@ pub fn drive(
             latency.cycles, latency.missed, latency.reply.p99_us
         ));
         Ok(json!({
-            "start_ns": span.start_ns, "end_ns": span.end_ns, "confirmed_ns": confirmed_ns,
-            "latency": latency,
+            "start_ns": span.start_ns, "end_ns": span.end_ns, "latency": latency,
         }))
     };
     let place = (out, name);

@@ -3,12 +3,21 @@
 
 use super::presence::{Presence, Switch};
 use super::{ProcessSpec, Received, RunFile, Supervisor};
-use anyhow::{bail, ensure};
+use anyhow::bail;
 use cli_output::is_interrupted;
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
+
+/// What the operator confirmed by a word, and when.
+#[derive(Debug, Clone, Copy)]
+pub struct Confirmation {
+    pub word: &'static str,
+    /// CLOCK_MONOTONIC (ns).
+    pub at_ns: u64,
+    pub at: SystemTime,
+}
 
 /// Processes, shared memory and records of one command.
 #[derive(Debug)]
@@ -23,6 +32,8 @@ pub struct Session {
     supervisor: Supervisor,
     /// What stages work with.
     pub received: Received,
+    /// What the operator has confirmed so far.
+    pub confirmed: Vec<Confirmation>,
     run_file: Option<RunFile>,
     bus: Bus,
     _sweep: DomainSweep,
@@ -50,6 +61,7 @@ impl Session {
             committed: false,
             supervisor: Supervisor::default(),
             received: Received::open(&bus)?,
+            confirmed: Vec::new(),
             run_file: None,
             bus,
             _sweep: DomainSweep::new(domain),
@@ -78,7 +90,8 @@ impl Session {
         eprintln!(
             "{}; Ctrl-C stops as well",
             match switch {
-                Switch::DeadMan => "Enter lets go of the dead-man switch",
+                Switch::DeadMan =>
+                    "Standard input is the dead-man switch: whatever nobody asked for lets go",
                 Switch::HoldToRun => "the arm moves only while Enter is held down",
             }
         );
@@ -106,14 +119,23 @@ impl Session {
                 break;
             };
             if let Some(at) = presence.confirmed() {
+                self.confirmed.push(Confirmation {
+                    word,
+                    at_ns: at.0,
+                    at: SystemTime::now(),
+                });
+                eprintln!("Confirmed; Enter, or any other input, stops from now on");
                 return Ok(at.0);
             }
-            ensure!(
-                !presence.is_let_go(),
-                "the area was not confirmed clear: type {word} when it is asked for, and nothing else; run the command again"
-            );
+            if presence.is_let_go() {
+                eprint!("\n");
+                bail!(
+                    "the area was not confirmed clear: type {word} once it is asked for, in capitals, and nothing before; run the command again"
+                );
+            }
             std::thread::sleep(TURN);
         }
+        eprint!("\n");
         bail!("nobody typed {word} within 120 s; run the command again")
     }
 

@@ -6,7 +6,7 @@ mod received;
 mod run_file;
 mod supervisor;
 
-pub use live::Session;
+pub use live::{Confirmation, Session};
 pub use presence::Switch;
 use received::Received;
 use run_file::RunFile;
