@@ -96,32 +96,25 @@ fn read_until(child: &mut Child, words: &str) -> String {
     String::from_utf8(text).unwrap()
 }
 
-/// A wiggle that asks as a real arm's does, up to the question in the start pose.
-fn rehearsed(arm: &SimulatedArm, run: &Path) -> Child {
-    let line = "wiggle --ask --yes --operator Ada";
-    let mut child = on_arm(arm, line, run)
-        .stdin(Stdio::piped())
-        .spawn()
-        .unwrap();
+/// A wiggle that asks as a real arm's does, answered by `word` in the start pose.
+fn rehearsed(run: &Path, word: &str) -> (Option<i32>, String) {
+    let arm = arm();
+    let mut command = on_arm(&arm, "wiggle --ask --yes --operator Ada", run);
+    let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
     read_until(&mut child, "type WIGGLE ");
-    child
+    let mut stdin = child.stdin.take().unwrap();
+    writeln!(stdin, "{word}").unwrap();
+    let said = said(child);
+    drop(stdin);
+    said
 }
 
 #[test]
 fn a_rehearsal_is_confirmed_in_the_start_pose_and_its_record_says_by_whom() {
     let folder = tempfile::tempdir().unwrap();
-    let (arm, run) = (arm(), folder.path().join("run"));
-    let mut child = rehearsed(&arm, &run);
-    child
-        .stdin
-        .as_mut()
-        .unwrap()
-        .write_all(b"WIGGLE\n")
-        .unwrap();
-    let stdin = child.stdin.take();
-    let (code, said) = said(child);
+    let run = folder.path().join("run");
+    let (code, said) = rehearsed(&run, "WIGGLE");
     assert_eq!(code, Some(0), "{said}");
-    drop(stdin);
     let summary = std::fs::read_to_string(run.join("summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&summary).unwrap();
     assert_eq!(summary["operator"], "Ada", "{summary:#}");
@@ -140,17 +133,8 @@ fn a_rehearsal_is_confirmed_in_the_start_pose_and_its_record_says_by_whom() {
 #[test]
 fn another_word_in_the_start_pose_moves_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let (arm, run) = (arm(), folder.path().join("run"));
-    let mut child = rehearsed(&arm, &run);
-    child
-        .stdin
-        .as_mut()
-        .unwrap()
-        .write_all(b"wiggle\n")
-        .unwrap();
-    let stdin = child.stdin.take();
-    let (code, said) = said(child);
-    drop(stdin);
+    let run = folder.path().join("run");
+    let (code, said) = rehearsed(&run, "wiggle");
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("not confirmed clear"), "{said}");
     let (cycles, _) = recorded(&run);
