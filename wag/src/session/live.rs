@@ -92,7 +92,7 @@ impl Session {
             match switch {
                 Switch::DeadMan =>
                     "Standard input is the dead-man switch: whatever nobody asked for lets go",
-                Switch::HoldToRun => "the arm moves only while Enter is held down",
+                Switch::HoldToRun => "The arm moves only while Enter is held down",
             }
         );
         Ok(())
@@ -124,7 +124,14 @@ impl Session {
                     at_ns: at.0,
                     at: SystemTime::now(),
                 });
-                eprintln!("Confirmed; Enter, or any other input, stops from now on");
+                eprintln!(
+                    "{}",
+                    match presence.switch() {
+                        Switch::DeadMan =>
+                            "Confirmed; Enter, or any other input, stops from now on",
+                        Switch::HoldToRun => "Confirmed",
+                    }
+                );
                 return Ok(at.0);
             }
             if presence.is_let_go() {

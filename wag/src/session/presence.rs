@@ -150,6 +150,10 @@ impl Presence {
         MonotonicNs(now_ns())
     }
 
+    pub const fn switch(&self) -> Switch {
+        self.typed.switch
+    }
+
     /// Whether the switch has been let go.
     pub fn is_let_go(&mut self) -> bool {
         let now = self.look();
