@@ -1,6 +1,6 @@
 //! What a stand has recorded, and what must hold of every flight.
 
-use arm_model::{JOINTS, JointVector, Limits};
+use arm_model::{JOINTS, JointVector, Limits, Pole};
 use hil_tests::setpoint_limits::assert_computed;
 use rt_controller::recording::RecordedCycle;
 use rt_controller::xarm::ArmState;
@@ -54,6 +54,15 @@ impl Flight {
     /// Sum of a count over all cycles.
     pub fn total(&self, count: impl Fn(&RecordedCycle) -> u32) -> u32 {
         self.cycles.iter().map(count).sum()
+    }
+
+    /// Largest speed of a pole's end in the controller's own moves, as commanded (m/s).
+    pub fn pole_top_m_s(&self, pole: &Pole) -> f64 {
+        let moving = |c: &&RecordedCycle| c.record.mode == ControllerMode::Moving as u8;
+        let moved = self.cycles.iter().filter(moving);
+        let ends: Vec<_> = moved.map(|c| pole.attach_pose(&c.record.q_c).0).collect();
+        let steps_m = ends.windows(2).map(|w| (w[1] - w[0]).norm());
+        steps_m.fold(0.0, f64::max) / self.limits.period_s()
     }
 
     /// Cycles whose setpoint went out.

@@ -7,7 +7,6 @@ use hil_tests::scenario::entry;
 use rt_controller::arm_settings::Load;
 use rt_controller::commander::CommanderLock;
 use rt_controller::config::OnDifference;
-use rt_controller::recording::RecordedCycle;
 use rt_controller::session::ArmSession;
 use rt_controller::xarm::report::{NormalReport, RICH_REPORT_LEN};
 use rt_controller::xarm::{Command, Mode, ReplyData};
@@ -310,13 +309,8 @@ fn the_poles_end_keeps_the_speed_that_a_move_is_armed_for() {
             speed_fraction: 1.0,
         });
         stand.finishes(&pending);
-        let (pole, period_s) = (stand.config.pole, Limits::default().period_s());
-        let flight = stand.finish();
-        let moving = |c: &&RecordedCycle| c.record.mode == ControllerMode::Moving as u8;
-        let moved = flight.cycles.iter().filter(moving);
-        let ends: Vec<_> = moved.map(|c| pole.attach_pose(&c.record.q_c).0).collect();
-        let steps_m = ends.windows(2).map(|w| (w[1] - w[0]).norm());
-        let top_m_s = steps_m.fold(0.0, f64::max) / period_s;
+        let pole = stand.config.pole;
+        let top_m_s = stand.finish().pole_top_m_s(&pole);
         assert!(
             (0.7 * most_m_s..1.01 * most_m_s).contains(&top_m_s),
             "{armed:?}: {top_m_s} m/s"
