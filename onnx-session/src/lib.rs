@@ -1,8 +1,6 @@
-//! Opens ONNX graphs in the runtime of this process.
+//! Opens ONNX graphs in the ONNX Runtime library that `ORT_DYLIB_PATH` names.
 //!
-//! A process may have one runtime only, whoever asks first: the native ONNX Runtime
-//! library that `ORT_DYLIB_PATH` names, else the embedded one in pure Rust (feature
-//! `embedded-runtime`). What a graph means is its users' business.
+//! What a graph means is its users' business.
 
 use std::sync::OnceLock;
 
@@ -23,33 +21,26 @@ pub enum OpenError {
     Refused(String),
 }
 
+/// The variable that names the library.
+pub const LIBRARY: &str = "ORT_DYLIB_PATH";
+
 /// The runtime of this process, or why there is none.
 fn runtime() -> Result<Environment, OpenError> {
     static RUNTIME: OnceLock<Result<Environment, String>> = OnceLock::new();
     RUNTIME
-        .get_or_init(|| match std::env::var_os("ORT_DYLIB_PATH") {
-            Some(path) => {
-                let named = |error: &dyn core::fmt::Display| {
-                    format!("ORT_DYLIB_PATH={}: {error}", path.to_string_lossy())
-                };
-                let builder = ort::init_from(&path).map_err(|e| named(&e))?;
-                builder.build().map_err(|e| named(&e))
-            }
-            None => embedded(),
+        .get_or_init(|| {
+            let path = std::env::var_os(LIBRARY).ok_or(
+                "no ONNX Runtime: set ORT_DYLIB_PATH to its library (libonnxruntime.so, 1.24 or \
+                 newer; the Python package `onnxruntime` has one in `onnxruntime/capi`)",
+            )?;
+            let named = |error: &dyn core::fmt::Display| {
+                format!("{LIBRARY}={}: {error}", path.to_string_lossy())
+            };
+            let builder = ort::init_from(&path).map_err(|e| named(&e))?;
+            builder.build().map_err(|e| named(&e))
         })
         .clone()
         .map_err(OpenError::NoRuntime)
-}
-
-#[cfg(feature = "embedded-runtime")]
-fn embedded() -> Result<Environment, String> {
-    ort::set_api(ort_tract::api());
-    ort::init().build().map_err(|error| error.to_string())
-}
-
-#[cfg(not(feature = "embedded-runtime"))]
-fn embedded() -> Result<Environment, String> {
-    Err("this build has no embedded runtime: set ORT_DYLIB_PATH to an ONNX Runtime library".into())
 }
 
 /// Opens a graph from the bytes of its file.

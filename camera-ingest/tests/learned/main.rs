@@ -1,5 +1,5 @@
-//! A learned tracker of points in the place of the built-in reading, through the embedded
-//! runtime: small graphs that are written here.
+//! A learned tracker of points in the place of the built-in reading, through the ONNX
+//! Runtime: small graphs that are written here.
 #![cfg(test)]
 #![allow(missing_docs, reason = "a test")]
 
@@ -45,6 +45,9 @@ fn grey(width_px: usize, height_px: usize, stamp_ns: u64) -> ImageFrame {
 
 #[test]
 fn chunks_join_where_the_points_are_seen_best() {
+    if onnx::no_runtime() {
+        return;
+    }
     let frames: Vec<ImageFrame> = (1..14).map(|stamp| grey(32, 16, stamp)).collect();
     let points = [[4.0, 5.0], [6.5, 3.0], [8.0, 4.0], [9.0, 9.0]];
     // A chunk of 8 shares 2 frames; its last one is seen worse than the one before.
@@ -167,6 +170,9 @@ fn refused(bytes: &[u8], words: &[&str]) {
 
 #[test]
 fn files_that_do_not_fit_are_refused_with_what_is_wanted() {
+    if onnx::no_runtime() {
+        return;
+    }
     let missing = OnnxTracker::load(std::path::Path::new("none.onnx")).unwrap_err();
     let missing = missing.to_string();
     assert!(missing.contains("check the path"), "{missing}");
@@ -231,6 +237,9 @@ fn files_that_do_not_fit_are_refused_with_what_is_wanted() {
 
 #[test]
 fn an_answer_of_no_numbers_is_refused() {
+    if onnx::no_runtime() {
+        return;
+    }
     let frames = [grey(16, 8, 1), grey(16, 8, 2)];
     let graph = steady([Is(8), Is(16)], Open("N"), [f32::NAN, 0.0], &[1.0; 2]);
     let file = file(&graph.file());
