@@ -39,6 +39,7 @@ pub mod session;
 pub mod set_up;
 pub mod transport;
 pub mod warm_up;
+mod watchdog;
 
 pub use config::ControllerConfig;
 pub use control_core::{clock_map, control, driver, overrun, point_to_point, report_feed, xarm};

@@ -18,6 +18,7 @@ use crate::rt_loop::RtLoop;
 use crate::transport::ArmTransport;
 use crate::transport::tcp::TcpLink;
 use crate::warm_up::CacheWarmUp;
+use crate::watchdog::Progress;
 use shared_types::ipc::{Bus, ControllerBoards, DomainSweep, IpcError};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -95,7 +96,9 @@ pub fn run(config: ControllerConfig, stop: &AtomicBool) -> Result<(), Controller
         .push(receiver.map_err(ControllerError::Thread)?);
     let held_to = (limits, settings);
     let mut bridge = Bridge::open(&bus, config, held_to, warnings, rings.bridge)?;
-    serve(&mut bridge, &threads, stop)
+    let progress = Progress::default();
+    progress.report()?;
+    serve(&mut bridge, &threads, &progress, stop)
 }
 
 /// Refuses to begin where shared memory is too small or full.
@@ -111,10 +114,16 @@ fn require_room() -> Result<(), ControllerError> {
 }
 
 /// Turns the bridge until `stop`, then until the arm rests.
-fn serve(bridge: &mut Bridge, threads: &Threads, stop: &AtomicBool) -> Result<(), ControllerError> {
+fn serve(
+    bridge: &mut Bridge,
+    threads: &Threads,
+    progress: &Progress,
+    stop: &AtomicBool,
+) -> Result<(), ControllerError> {
     let mut stopping: Option<Instant> = None;
     loop {
         bridge.turn();
+        progress.reached(bridge.cycle());
         if !threads.loop_lives() {
             bridge.stop_arm();
             bridge.confirm_stop();

@@ -132,5 +132,8 @@ fn fault_26_an_upload_that_hangs_is_refused_after_its_time() {
     assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
     let pending = stand.call(&late);
     stand.finishes(&pending);
+    // It ran once; nobody runs it again by its hash alone.
+    assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
+    assert_eq!(stand.refused(&late).0, FaultCode::WrongMode);
     stand.finish();
 }

@@ -162,6 +162,12 @@ impl Bridge {
         ControllerMode::from_raw(self.newest.mode)
     }
 
+    /// Number of the loop's newest cycle.
+    #[must_use]
+    pub fn cycle(&self) -> u64 {
+        self.newest.cycle
+    }
+
     /// Does all that has come up since the last turn. Call it every few
     /// milliseconds.
     pub fn turn(&mut self) {

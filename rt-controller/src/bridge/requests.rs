@@ -3,6 +3,7 @@
 use super::answers::{ControllerCall, answer, refuse};
 use super::{Awaited, Bridge, Open, REPORT_WAIT, SET_UP_TIMEOUT};
 use crate::commander::CommanderLock;
+use crate::config::ControllerConfig;
 use crate::control::{ControlCommand, Motion};
 use crate::point_to_point::{plan_move, verify};
 use crate::session::{ArmSession, SessionError};
@@ -14,6 +15,7 @@ use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
 use shared_types::{FaultCode, MonotonicNs};
 use std::collections::VecDeque;
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Why nothing begins yet.
@@ -33,6 +35,10 @@ impl Bridge {
                 let report = Box::new(self.latencies.take());
                 answer(&call, &ControllerEvent::Latency(report));
             }
+            ControllerRequest::Configuration => match toml::to_string(&self.in_force()) {
+                Ok(config) => answer(&call, &ControllerEvent::Configuration(config)),
+                Err(reason) => refuse(&call, FaultCode::WrongMode, &reason.to_string()),
+            },
             // Whatever the newest record says: an engagement may be on its way to the loop.
             ControllerRequest::Stop => {
                 self.pass_on(call, ControlCommand::Stop, None, Awaited::Stopped);
@@ -73,12 +79,10 @@ impl Bridge {
                 ref trajectory,
                 sha256,
             } => self.uploads.serve_upload(&call, trajectory, sha256),
-            ControllerRequest::ExecuteUploaded { sha256 } => {
-                match self.uploads.plan(&sha256).copied() {
-                    Some(trajectory) => self.serve_execute(call, &trajectory, &sha256),
-                    None => self.wrong_mode(&call, "there is no uploaded plan with this hash"),
-                }
-            }
+            ControllerRequest::ExecuteUploaded { sha256 } => match self.uploads.take(&sha256) {
+                Some(trajectory) => self.serve_execute(call, &trajectory, &sha256),
+                None => self.wrong_mode(&call, "there is no uploaded plan with this hash"),
+            },
             ControllerRequest::Execute {
                 ref trajectory,
                 sha256,
@@ -86,6 +90,17 @@ impl Bridge {
                 let trajectory = trajectory.clone();
                 self.serve_execute(call, &trajectory, &sha256);
             }
+        }
+    }
+
+    /// The configuration with the limits that it names, and with files as any process finds them.
+    fn in_force(&self) -> ControllerConfig {
+        let found = |file: &PathBuf| std::path::absolute(file).unwrap_or_else(|_| file.clone());
+        ControllerConfig {
+            limits_file: None,
+            limits: Some(self.limits.clone()),
+            arm_response_file: self.config.arm_response_file.as_ref().map(found),
+            ..self.config.clone()
         }
     }
 

@@ -1,4 +1,4 @@
-//! Plans on their way in: announced, uploaded, kept until they run.
+//! Plans on their way in: announced, uploaded, kept until they are asked to run.
 //!
 //! A plan travels whole in one request and is copied and hash-checked before
 //! anything moves; while it runs nothing is read from whoever made it. Whoever
@@ -27,15 +27,21 @@ pub(super) struct Uploads {
 }
 
 impl Uploads {
-    /// The plan with this hash, if it is here.
-    pub(super) fn plan(&self, sha256: &Hash) -> Option<&JointTrajectory> {
-        let (hash, plan) = self.plan.as_ref()?;
-        (hash == sha256).then_some(plan)
+    /// Whether the plan with this hash is here.
+    fn has(&self, sha256: &Hash) -> bool {
+        self.plan.as_ref().is_some_and(|(hash, _)| hash == sha256)
+    }
+
+    /// Takes the plan with this hash, if it is here: what was asked to run once runs again only
+    /// when somebody uploads it again.
+    pub(super) fn take(&mut self, sha256: &Hash) -> Option<Box<JointTrajectory>> {
+        let its = self.plan.take_if(|(hash, _)| hash == sha256);
+        its.map(|(_, plan)| plan)
     }
 
     /// Serves an announcement; it is answered with the plan's arrival.
     pub(super) fn serve_announcement(&mut self, call: ControllerCall, sha256: Hash) {
-        if self.plan(&sha256).is_some() {
+        if self.has(&sha256) {
             return answer(&call, &ControllerEvent::Done);
         }
         let until = Instant::now() + UPLOAD_WITHIN;

@@ -21,6 +21,7 @@ mod watched;
 use crate::config::ControllerConfig;
 use crate::error::ControllerError;
 use crate::os::{Clock, MonotonicClock, RealTimeSettings, enter_real_time};
+use crate::watchdog::Progress;
 use decision::{Emergency, Guardian, GuardianInput, GuardianPhase};
 use line::ArmLine;
 use shared_types::ipc::{Bus, DomainSweep, GuardianBeat};
@@ -56,6 +57,8 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
         watched: None,
         looked_ns: 0,
     };
+    let progress = Progress::default();
+    progress.report()?;
     let mut clock = MonotonicClock;
     let mut next_ns = clock.now_ns();
     let mut leaving_ns = None;
@@ -64,6 +67,7 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
         clock.sleep_until(next_ns);
         let now_ns = clock.now_ns();
         let moving = runner.turn(&bus, now_ns);
+        progress.reached(now_ns);
         if stop.load(Ordering::Relaxed) {
             let since_ns = now_ns.saturating_sub(*leaving_ns.get_or_insert(now_ns));
             let most_ns = if runner.line.is_connected() {

@@ -218,6 +218,8 @@ pub enum ControllerRequest {
     Acknowledge,
     /// Latency histograms since the last call of this kind.
     Latency,
+    /// What are you configured for?
+    Configuration,
 }
 
 /// Percentiles of one latency (µs).
@@ -295,6 +297,8 @@ pub enum ControllerEvent {
     Done,
     /// Histograms.
     Latency(Box<LatencyReport>),
+    /// The configuration in force (TOML), limits included.
+    Configuration(String),
     /// Refused before anything moved.
     Refused {
         /// Cause.
@@ -320,7 +324,7 @@ pub enum ControllerEvent {
 pub struct ControllerRpc;
 
 impl Rpc for ControllerRpc {
-    const NAME: &'static str = "wag/v2/controller/control";
+    const NAME: &'static str = "wag/v3/controller/control";
     type Request = ControllerRequest;
     type Event = ControllerEvent;
     fn is_last(event: &ControllerEvent) -> bool {

@@ -27,6 +27,16 @@ pub struct ArmArgs {
     /// Address or name of the arm's controller.
     #[arg(long = "arm", value_name = "ADDR", value_parser = host)]
     pub address: Option<IpAddr>,
+    /// Controller that runs as a service, by its shared-memory domain, instead of one started
+    /// for this command: arm, limits and measured response are as that one is configured.
+    #[arg(long, value_name = "NAME", conflicts_with_all = [
+        "address", "command_port", "report_port", "status_port", "limits", "arm_response", "dry_run",
+    ])]
+    pub controller: Option<String>,
+    /// Go on although the controller of --controller has stopped: you know why, and the arm may
+    /// be enabled again.
+    #[arg(long, requires = "controller")]
+    pub acknowledge: bool,
     #[command(flatten)]
     pub ports: ArmPorts,
     /// The area is clear and the emergency stop is in reach for the bring-up and the move to
@@ -60,6 +70,13 @@ pub struct ArmArgs {
     /// (or a button's driver sends empty lines, at least every 0.3 s).
     #[arg(long, conflicts_with = "dead_man")]
     pub hold_to_run: bool,
+}
+
+impl ArmArgs {
+    /// Whether an arm is named.
+    pub const fn names_arm(&self) -> bool {
+        self.address.is_some() || self.controller.is_some()
+    }
 }
 
 #[derive(Debug, Args)]
@@ -103,7 +120,7 @@ pub struct LatencyArgs {
     #[command(flatten)]
     pub arm: ArmArgs,
     /// Folder of a recorded run to read instead.
-    #[arg(long, conflicts_with_all = ["address", "joints", "excitation", "seed", "out"])]
+    #[arg(long, conflicts_with_all = ["address", "controller", "joints", "excitation", "seed", "out"])]
     pub run: Option<PathBuf>,
     /// Joints to move (1 to 7); default: all.
     #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=7))]

@@ -3,9 +3,9 @@
 
 use crate::cli::ArmArgs;
 use crate::config;
-use crate::pipeline::ArmAddress;
+use crate::pipeline::{ArmAddress, Service};
 use anyhow::Context;
-use arm_model::ArmResponse;
+use arm_model::{ArmResponse, Limits};
 use cli_output::{OrInput, Outcome, output};
 use rt_controller::config::measured_lags;
 use rt_controller::session::ArmSession;
@@ -24,6 +24,21 @@ const WAIT: Duration = Duration::from_secs(2);
 /// # Errors
 /// Nobody is there.
 pub fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
+    if let Some(domain) = &arm.controller {
+        let service = Service::find(domain).or_failed()?;
+        if let Some(fault) = service.stopped.filter(|_| !arm.acknowledge) {
+            return Err(failed!(
+                "the controller of `{domain}` has stopped ({fault:?}): {}; look at the arm, then add --acknowledge",
+                fault.explain()
+            ));
+        }
+        if service.config.pole != config::cell().or_input()?.pole {
+            return Err(bad_input!(
+                "the controller of `{domain}` watches the end of another pole than the cell has (`wag config show cell`): bring `pole` in its configuration in line and start it again"
+            ));
+        }
+        return Ok(Some(service.address()));
+    }
     let Some(ip) = arm.address.filter(|_| !arm.dry_run) else {
         return Ok(None);
     };
@@ -40,7 +55,17 @@ pub fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
         status: [ports.status_port; 2],
         simulated,
         arm_response: None,
+        service: None,
     }))
+}
+
+/// The limits that a motion must keep: those of the controller that runs, else those that hold
+/// here.
+pub fn limits(arm: &ArmArgs, address: Option<&ArmAddress>) -> Outcome<Limits> {
+    match address.and_then(|address| address.service.as_ref()) {
+        Some(service) => Ok(service.limits.clone()),
+        None => config::here::<Limits>(arm.limits.as_deref()).or_input(),
+    }
 }
 
 /// The same, and how its joints follow their setpoints, for motions that are fast enough for a
@@ -55,17 +80,26 @@ pub fn reach_measured(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
     let Some(address) = reach(arm)? else {
         return Ok(None);
     };
-    let named = arm.arm_response.clone();
+    let named = match &address.service {
+        Some(service) => service.config.arm_response_file.clone(),
+        None => arm.arm_response.clone(),
+    };
     let places: Vec<PathBuf> = config::arm_response_files().or_input()?.collect();
     let here = || {
         let mut there = places
             .iter()
             .filter(|file| file.try_exists().unwrap_or(true));
-        there.next().cloned().filter(|_| !address.simulated)
+        let may = !address.simulated && address.service.is_none();
+        there.next().cloned().filter(|_| may)
     };
     let Some(path) = named.clone().or_else(here) else {
         if address.simulated {
             return Ok(Some(address));
+        }
+        if let Some(domain) = &arm.controller {
+            return Err(bad_input!(
+                "how this arm follows its setpoints was not measured, and its lag could look like a jammed joint: run `wag latency --controller {domain} --response FILE`, name that file as `arm_response_file` in the controller's configuration, and start it again"
+            ));
         }
         let place = places.first().map_or_else(String::new, |file| {
             format!(" --response '{}'", file.display())

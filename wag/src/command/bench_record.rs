@@ -103,7 +103,7 @@ fn measure(
     stage: &Stage,
 ) -> anyhow::Result<([Vec<CycleRecord>; 2], u64)> {
     let (_, address) = pipeline::start_rig(session, folder, rig)?;
-    let arm = pipeline::start_controller(session, folder, limits, &address)?;
+    let arm = pipeline::controller(session, folder, limits, &address)?;
     pipeline::acquire(session, &arm, &mut BringUp::default())?;
     let mut cycles = [Vec::new(), Vec::new()];
     let mut file_bytes = 0;

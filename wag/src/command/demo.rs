@@ -180,7 +180,7 @@ impl<'a> Demo<'a> {
         };
         let ping = &PlannerRequest::Ping;
         let planner = pipeline::start(session, folder, "planner", &config, ping)?;
-        let arm = pipeline::start_controller(session, folder, &limits, &address)?;
+        let arm = pipeline::controller(session, folder, &limits, &address)?;
         record.stages.start_s = stage.done("rig, controller, camera and planner are up");
         Ok(Self {
             folder,

@@ -33,7 +33,10 @@ pub fn on_arm(
 ) -> Outcome<(PathBuf, Value)> {
     watch_interrupts().or_failed()?;
     let operator = operator(arm, &address)?;
-    let folder = RunFolder::create(out, name)?;
+    let mut folder = RunFolder::create(out, name)?;
+    if let Some(service) = &address.service {
+        folder.domain.clone_from(&service.config.domain);
+    }
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
     if arm.hold_to_run {
         session.watch_operator(Switch::HoldToRun).or_failed()?;
@@ -92,7 +95,7 @@ fn bring_up(
 ) -> anyhow::Result<ArmLink> {
     let stage = Stage::begin("bring-up");
     pipeline::start_recorder(session, folder, limits, None, None)?;
-    let link = pipeline::start_controller(session, folder, limits, address)?;
+    let link = pipeline::controller(session, folder, limits, address)?;
     pipeline::acquire(session, &link, found)?;
     for warning in &found.warnings {
         tracing::warn!("{warning}");

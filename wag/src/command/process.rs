@@ -6,6 +6,7 @@
 use crate::cli::{ProcessArgs, ProcessName};
 use anyhow::Context;
 use cli_output::{OrInput, Outcome, interrupted, watch_interrupts};
+use rt_controller::ControllerConfig;
 use run_log::files;
 use serde::de::DeserializeOwned;
 use shared_types::ipc::DomainSweep;
@@ -62,6 +63,11 @@ fn read<T: DeserializeOwned>(args: &ProcessArgs) -> Outcome<T> {
         .or_input()
 }
 
+/// The controller's configuration, whose files lie beside it.
+fn controller(args: &ProcessArgs) -> Outcome<ControllerConfig> {
+    ControllerConfig::load(&args.config).or_input()
+}
+
 /// Does a process's work with its configuration.
 fn work<T: DeserializeOwned, E: Into<anyhow::Error>>(
     args: &ProcessArgs,
@@ -100,8 +106,8 @@ pub fn run(args: &ProcessArgs) -> Outcome {
     let _sweep = domain.map(DomainSweep::new);
     match args.name {
         ProcessName::Rig => work(args, |c| rig_sim::run(&c, stop)),
-        ProcessName::RtController => work(args, |c| rt_controller::run(c, stop)),
-        ProcessName::Guardian => work(args, |c| rt_controller::guardian::run(&c, stop)),
+        ProcessName::RtController => rt_controller::run(controller(args)?, stop).or_failed(),
+        ProcessName::Guardian => rt_controller::guardian::run(&controller(args)?, stop).or_failed(),
         ProcessName::Camera => work(args, |c| camera_ingest::live::run(&c, stop)),
         ProcessName::CameraIngest => work(args, |c| camera_ingest::process::run(&c, stop)),
         ProcessName::Preview => {

@@ -1,6 +1,6 @@
 //! `wag throw`: execute a plan on an arm, once, open loop, with latencies.
 
-use super::area::{asks, reach_measured, require_clear_area};
+use super::area::{asks, limits, reach_measured, require_clear_area};
 use super::dry_run;
 use super::on_arm::on_arm;
 use super::plan::LOOK;
@@ -84,7 +84,9 @@ pub fn drive(
         return dry_run::tell(arm, limits, trajectory, name).map(Some);
     }
     let Some(address) = address else {
-        return Err(bad_input!("name the arm with --arm ADDR"));
+        return Err(bad_input!(
+            "name the arm with --arm ADDR, or a controller that runs with --controller NAME"
+        ));
     };
     require_measured_joints(&address, trajectory, name)?;
     let start = trajectory.start();
@@ -123,7 +125,7 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
     if let Some(address) = &address {
         require_clear_area(&args.arm, address, "MOVE")?;
     }
-    let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
+    let limits = limits(&args.arm, address.as_ref())?;
     let run = drive(
         &args.arm,
         address,

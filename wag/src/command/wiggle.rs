@@ -1,11 +1,10 @@
 //! `wag wiggle`: the probing motion, written to a file or executed.
 
-use super::area::{reach_measured, require_clear_area};
+use super::area::{limits, reach_measured, require_clear_area};
 use super::throw::drive;
 use super::wiggle_design;
 use crate::cli::WiggleArgs;
 use crate::config;
-use arm_model::Limits;
 use cli_output::{OrInput, Outcome};
 use planner::PlannerConfig;
 use planner::wiggle::wiggle;
@@ -17,7 +16,7 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
     if args.evaluate || args.optimise {
         return wiggle_design::run(args);
     }
-    if args.csv.is_none() && args.arm.address.is_none() && !args.arm.dry_run {
+    if args.csv.is_none() && !args.arm.names_arm() && !args.arm.dry_run {
         return Err(bad_input!(
             "choose what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it, --evaluate reports its information"
         ));
@@ -26,7 +25,7 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
     if let Some(address) = &address {
         require_clear_area(&args.arm, address, "MOVE")?;
     }
-    let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
+    let limits = limits(&args.arm, address.as_ref())?;
     let config = config::here::<PlannerConfig>(None).or_input()?.wiggle;
     let trajectory = wiggle(&config, &limits).or_failed()?;
     if let Some(path) = &args.csv {
@@ -37,7 +36,7 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
             path.display()
         );
     }
-    let run = if args.arm.address.is_some() || args.arm.dry_run {
+    let run = if args.arm.names_arm() || args.arm.dry_run {
         drive(
             &args.arm,
             address,

@@ -5,6 +5,7 @@ use anyhow::{anyhow, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use rt_controller::os::now_ns;
 use shared_types::OperatingMode;
+use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{
     ControllerEvent, ControllerRequest, ControllerRpc, LatencyReport,
 };
@@ -75,11 +76,17 @@ pub struct BringUp {
     pub warnings: Vec<String>,
 }
 
-/// Takes the operator's place, connects the arm and enables it; what was `found` on the way,
-/// also when it is refused.
+/// Takes the operator's place, connects the arm and enables it, of a controller that runs already
+/// also after a stop; what was `found` on the way, also when it is refused.
 pub fn acquire(session: &mut Session, arm: &ArmLink, found: &mut BringUp) -> anyhow::Result<()> {
     session.take_operator()?;
-    let done = session.ask(arm, &ControllerRequest::Bringup, 20.0, |event| {
+    let bring_up = match session.ask(arm, &ControllerRequest::Status, 5.0, |_| ())? {
+        ControllerEvent::Status { mode, .. } if mode == ControllerMode::Faulted => {
+            ControllerRequest::Acknowledge
+        }
+        _ => ControllerRequest::Bringup,
+    };
+    let done = session.ask(arm, &bring_up, 20.0, |event| {
         if let ControllerEvent::Step { name, result } = event {
             found.steps.push((name.clone(), result.clone()));
         }

@@ -4,9 +4,11 @@
 mod arm;
 mod processes;
 mod run_folder;
+mod service;
 
 pub use arm::{
     ArmLink, BringUp, MotionSpan, acquire, arm_for, arm_simulated, execute, latency, move_to,
 };
-pub use processes::{ArmAddress, rig_config, start, start_controller, start_recorder, start_rig};
+pub use processes::{ArmAddress, controller, rig_config, start, start_recorder, start_rig};
 pub use run_folder::RunFolder;
+pub use service::Service;

@@ -1,6 +1,6 @@
 //! Starting the processes of a session and connecting to them.
 
-use super::{ArmLink, RunFolder};
+use super::{ArmLink, RunFolder, Service};
 use crate::config;
 use crate::session::{ProcessSpec, Session};
 use anyhow::bail;
@@ -87,6 +87,7 @@ pub fn start_rig(
                 status: [rich, normal],
                 simulated: true,
                 arm_response: None,
+                service: None,
             };
             Ok((rig, address))
         }
@@ -108,15 +109,21 @@ pub struct ArmAddress {
     pub simulated: bool,
     /// How it follows its setpoints, where that is known, and the file that tells it.
     pub arm_response: Option<(PathBuf, ArmResponse)>,
+    /// The controller that drives it, where one runs as a service.
+    pub service: Option<Service>,
 }
 
-/// Starts the controller for an arm, and its guardian.
-pub fn start_controller(
+/// The controller of an arm: the one that runs for it, or one that is started with its guardian.
+pub fn controller(
     session: &mut Session,
     folder: &RunFolder,
     limits: &Limits,
     arm: &ArmAddress,
 ) -> anyhow::Result<ArmLink> {
+    if let Some(service) = &arm.service {
+        folder.config("rt-controller", &service.config)?;
+        return session.connect(&ControllerRequest::Status);
+    }
     let config = folder.config("rt-controller", &controller_config(folder, limits, arm)?)?;
     for name in ["rt-controller", "guardian"] {
         session.start(&ProcessSpec {

@@ -4,5 +4,6 @@
 mod guardian;
 mod recorded;
 mod rig;
+mod service;
 #[path = "../support/mod.rs"]
 mod support;

@@ -2,10 +2,10 @@
 
 use super::evidence::Evidence;
 use crate::cli::LatencyArgs;
-use crate::command::area::{asks, reach, require_clear_area};
+use crate::command::area::{asks, limits, reach, require_clear_area};
 use crate::command::on_arm::on_arm;
 use crate::config;
-use crate::pipeline;
+use crate::pipeline::{self, ArmAddress};
 use anyhow::Context;
 use arm_model::response::Excitation;
 use arm_model::{JOINTS, JointTrajectory, Limits};
@@ -22,8 +22,8 @@ const REST: Duration = Duration::from_millis(600);
 /// Limits, the shape of the motion, and the sweeps asked for with their joints (1-based).
 type Intent = (Limits, Excitation, Vec<(usize, JointTrajectory)>);
 
-fn intent(args: &LatencyArgs) -> Outcome<Intent> {
-    let limits = config::here::<Limits>(args.arm.limits.as_deref()).or_input()?;
+fn intent(args: &LatencyArgs, address: Option<&ArmAddress>) -> Outcome<Intent> {
+    let limits = limits(&args.arm, address)?;
     let mut excitation = match &args.excitation {
         Some(path) => files::read_excitation(path).or_input()?,
         None => Excitation::default(),
@@ -46,7 +46,7 @@ fn intent(args: &LatencyArgs) -> Outcome<Intent> {
 
 /// Checks the motions and connects to nothing.
 pub(super) fn dry_run(args: &LatencyArgs) -> Outcome<Value> {
-    let (_, _, sweeps) = intent(args)?;
+    let (_, _, sweeps) = intent(args, None)?;
     let moving_s: f64 = sweeps.iter().map(|(_, t)| t.duration_s()).sum();
     println!(
         "dry run: {} sweeps keep all limits and would move the arm for {moving_s:.0} s; nothing was connected",
@@ -62,10 +62,10 @@ pub(super) fn measure(
     args: &LatencyArgs,
     conclude: impl FnOnce(&Evidence) -> anyhow::Result<Value>,
 ) -> Outcome<Value> {
-    let (limits, excitation, sweeps) = intent(args)?;
     let Some(address) = reach(&args.arm)? else {
         return Err(bad_input!("name the arm with --arm ADDR"));
     };
+    let (limits, excitation, sweeps) = intent(args, Some(&address))?;
     require_clear_area(&args.arm, &address, "MOVE")?;
     let is_asked = asks(&args.arm, &address);
     let Some((_, first)) = sweeps.first() else {

@@ -25,10 +25,10 @@ use show::Findings;
 
 pub fn run(args: &LatencyArgs) -> Outcome<Option<Value>> {
     let conclude = |evidence: &Evidence| conclude(args, evidence);
-    let value = match (&args.arm.address, &args.run) {
+    let value = match (args.arm.names_arm(), &args.run) {
         (_, None) if args.arm.dry_run => return measure::dry_run(args).map(Some),
-        (Some(_), None) => measure::measure(args, conclude)?,
-        (None, Some(run)) => conclude(&Evidence::recorded(run).or_input()?).or_failed()?,
+        (true, None) => measure::measure(args, conclude)?,
+        (false, Some(run)) => conclude(&Evidence::recorded(run).or_input()?).or_failed()?,
         _ => {
             return Err(bad_input!(
                 "say what to measure: --arm ADDR moves an arm (start `wag rig` for a simulated one), --run RUN reads a recorded run"

@@ -1,0 +1,77 @@
+//! A controller that runs as a service: what it is configured for, asked before anything moves.
+
+use super::ArmAddress;
+use anyhow::{Context, anyhow, bail};
+use arm_model::Limits;
+use rt_controller::ControllerConfig;
+use shared_types::FaultCode;
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
+use shared_types::ipc::rpc::RpcClient;
+use shared_types::ipc::{Bus, ControllerMode, DomainSweep, IpcError};
+use std::time::Duration;
+
+/// Longest wait for an answer: a bring-up that somebody else asked for may be under way.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(20);
+
+/// A running controller.
+#[derive(Debug, Clone)]
+pub struct Service {
+    pub config: ControllerConfig,
+    pub limits: Limits,
+    /// Why it has stopped, if it has.
+    pub stopped: Option<FaultCode>,
+}
+
+impl Service {
+    /// Asks the controller of a shared-memory domain.
+    ///
+    /// # Errors
+    /// None runs there, or it does not say.
+    pub fn find(domain: &str) -> anyhow::Result<Self> {
+        // Removed last: it looks for others in the domain.
+        let _sweep = DomainSweep::new(domain);
+        let bus = Bus::join(domain)?;
+        let client = RpcClient::<ControllerRpc>::open(&bus)?;
+        let ask = |request: &ControllerRequest| match client.call(request) {
+            Ok(pending) => pending.finish::<anyhow::Error>(ANSWERED_WITHIN, || Ok(()), |_| ()),
+            Err(IpcError::Gone { .. }) => Err(anyhow!(
+                "no controller runs in domain `{domain}`: start one (`systemctl start wag-controller`, or `wag process rt-controller --config FILE`), as the same user"
+            )),
+            Err(reason) => Err(reason.into()),
+        };
+        let unclear = |event| anyhow!("the controller of `{domain}` answered with {event:?}");
+        let config: ControllerConfig = match ask(&ControllerRequest::Configuration)? {
+            ControllerEvent::Configuration(text) => toml::from_str(&text)
+                .with_context(|| format!("configuration of the controller of `{domain}`"))?,
+            other => return Err(unclear(other)),
+        };
+        let stopped = match ask(&ControllerRequest::Status)? {
+            ControllerEvent::Status { mode, fault, .. } => match mode {
+                ControllerMode::Offline | ControllerMode::Idle => None,
+                ControllerMode::Faulted => Some(fault),
+                busy => bail!("the controller of `{domain}` is {busy:?}: somebody else uses it"),
+            },
+            other => return Err(unclear(other)),
+        };
+        let limits = config.resolve_limits()?;
+        Ok(Self {
+            config,
+            limits,
+            stopped,
+        })
+    }
+
+    /// Where its arm listens.
+    pub fn address(self) -> ArmAddress {
+        let config = &self.config;
+        ArmAddress {
+            ip: config.arm,
+            command: config.command_port,
+            joints: config.report_port,
+            status: config.status_ports,
+            simulated: config.simulated,
+            arm_response: None,
+            service: Some(self),
+        }
+    }
+}
