@@ -37,7 +37,7 @@ pub fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
                 "the controller of `{domain}` watches the end of another pole than the cell has (`wag config show cell`): bring `pole` in its configuration in line and start it again"
             ));
         }
-        return Ok(Some(service.address()));
+        return Ok(Some(service.into()));
     }
     let Some(ip) = arm.address.filter(|_| !arm.dry_run) else {
         return Ok(None);

@@ -113,6 +113,21 @@ pub struct ArmAddress {
     pub service: Option<Service>,
 }
 
+impl From<Service> for ArmAddress {
+    fn from(service: Service) -> Self {
+        let config = &service.config;
+        Self {
+            ip: config.arm,
+            command: config.command_port,
+            joints: config.report_port,
+            status: config.status_ports,
+            simulated: config.simulated,
+            arm_response: None,
+            service: Some(service),
+        }
+    }
+}
+
 /// The controller of an arm: the one that runs for it, or one that is started with its guardian.
 pub fn controller(
     session: &mut Session,

@@ -1,6 +1,5 @@
 //! A controller that runs as a service: what it is configured for, asked before anything moves.
 
-use super::ArmAddress;
 use anyhow::{Context, anyhow, bail};
 use arm_model::Limits;
 use rt_controller::ControllerConfig;
@@ -59,19 +58,5 @@ impl Service {
             limits,
             stopped,
         })
-    }
-
-    /// Where its arm listens.
-    pub fn address(self) -> ArmAddress {
-        let config = &self.config;
-        ArmAddress {
-            ip: config.arm,
-            command: config.command_port,
-            joints: config.report_port,
-            status: config.status_ports,
-            simulated: config.simulated,
-            arm_response: None,
-            service: Some(self),
-        }
     }
 }
