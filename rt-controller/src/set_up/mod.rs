@@ -8,6 +8,7 @@
 //! recovery as in the vendor's manual: clear error, enable, mode, state.
 
 mod compare;
+mod geometry;
 mod reports;
 
 pub use compare::{Headroom, ToolSpeed};
@@ -92,6 +93,7 @@ impl SetUp<'_> {
         reported("settings", &self.match_settings(session)?);
         self.read_settings_back()?;
         reported("settings read back", "tool and settings as above");
+        reported("geometry", &self.match_geometry(session, &mut warnings)?);
         let enabled = self.enable(session, reported);
         if enabled.is_err() {
             // Nobody watches an arm that was refused: it must not stay ready.
