@@ -122,6 +122,11 @@ pub struct LatencyArgs {
     /// Folder of a recorded run to read instead.
     #[arg(long, conflicts_with_all = ["address", "controller", "joints", "excitation", "seed", "out"])]
     pub run: Option<PathBuf>,
+    /// Measure how long and how far the arm goes on when it is stopped, instead of how its joints
+    /// follow: swings of joint 1 as fast as set-up motions, wiggles and throws may be, stopped by
+    /// the controller and by the arm itself.
+    #[arg(long, conflicts_with_all = ["run", "joints", "excitation", "seed", "response", "dry_run"])]
+    pub stops: bool,
     /// Joints to move (1 to 7); default: all.
     #[arg(long, value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=7))]
     pub joints: Vec<u8>,

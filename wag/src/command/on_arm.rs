@@ -14,7 +14,7 @@ use shared_types::OperatingMode;
 use std::path::{Path, PathBuf};
 
 /// Part of the arm's speed limits used for the move to the start pose.
-const MOVE_SPEED: f64 = 0.1;
+pub const MOVE_SPEED: f64 = 0.1;
 
 /// Moves the arm at `address` to `start` and lets `work` go on. When the processes have ended, `conclude`
 /// makes the run's summary from its folder, the received cycles and what `work` returned.

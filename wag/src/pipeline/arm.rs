@@ -76,10 +76,15 @@ pub struct BringUp {
     pub warnings: Vec<String>,
 }
 
-/// Takes the operator's place, connects the arm and enables it, of a controller that runs already
-/// also after a stop; what was `found` on the way, also when it is refused.
+/// Takes the operator's place, connects the arm and enables it; what was `found` on the way,
+/// also when it is refused.
 pub fn acquire(session: &mut Session, arm: &ArmLink, found: &mut BringUp) -> anyhow::Result<()> {
     session.take_operator()?;
+    enable(session, arm, found)
+}
+
+/// Enables the arm, also after a stop, which is acknowledged by it.
+pub fn enable(session: &mut Session, arm: &ArmLink, found: &mut BringUp) -> anyhow::Result<()> {
     let bring_up = match session.ask(arm, &ControllerRequest::Status, 5.0, |_| ())? {
         ControllerEvent::Status { mode, .. } if mode == ControllerMode::Faulted => {
             ControllerRequest::Acknowledge

@@ -3,6 +3,7 @@
 #![cfg(test)]
 
 mod command;
+mod stops;
 #[path = "../support/mod.rs"]
 mod support;
 mod virtual_time;

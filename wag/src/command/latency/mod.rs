@@ -7,6 +7,7 @@
 mod evidence;
 mod measure;
 mod show;
+mod stops;
 
 pub use show::loop_table;
 
@@ -24,6 +25,9 @@ use serde_json::{Value, json};
 use show::Findings;
 
 pub fn run(args: &LatencyArgs) -> Outcome<Option<Value>> {
+    if args.stops {
+        return stops::measure(args).map(Some);
+    }
     let conclude = |evidence: &Evidence| conclude(args, evidence);
     let value = match (args.arm.names_arm(), &args.run) {
         (_, None) if args.arm.dry_run => return measure::dry_run(args).map(Some),

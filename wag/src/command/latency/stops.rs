@@ -1,0 +1,231 @@
+//! `wag latency --stops`: how long, and how far, an arm goes on that is told to stop.
+//!
+//! Joint 1 swings the arm about its column as fast as set-up motions, wiggles and throws may be,
+//! and is stopped at full speed: by the controller's brake, and by asking the arm itself (state
+//! 4), as the guardian does. What is measured is in the arm's joint reports.
+
+use crate::cli::LatencyArgs;
+use crate::command::area::{asks, limits, reach_measured, require_clear_area};
+use crate::command::on_arm::{MOVE_SPEED, on_arm};
+use crate::config;
+use crate::pipeline::{self, ArmLink, BringUp};
+use crate::session::Session;
+use anyhow::{Context, bail, ensure};
+use arm_model::joint::START_POSE;
+use arm_model::kinematics::tool_speed_m_s;
+use arm_model::{JointTrajectory, Limits, Pole};
+use cli_output::{OrInput, Outcome, Stage, table};
+use rt_controller::armed_speed::ArmedSpeed;
+use rt_controller::control::{Motion, OperatingModeSpeeds};
+use rt_controller::os::now_ns;
+use rt_controller::session::ArmSession;
+use serde_json::{Value, json};
+use shared_types::OperatingMode;
+use shared_types::ipc::JointReport;
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
+use shared_types::plan::trajectory_hash;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+/// How far joint 1 would turn (rad); it is stopped half way.
+const SWING_RAD: f64 = 0.9;
+/// Waypoints of the swing.
+const WAYPOINTS: usize = 13;
+/// Longest and shortest swing that is tried (s).
+const LASTS_S: [f64; 2] = [0.4, 12.0];
+/// A joint that is slower stands still (rad/s).
+const STILL_RAD_S: f64 = 5e-3;
+/// How long the joints are watched after a stop.
+const WATCHED: Duration = Duration::from_millis(1500);
+/// Longest wait for an answer of the arm.
+const ANSWERED: Duration = Duration::from_secs(1);
+
+/// How the arm is stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    Brake,
+    State4,
+}
+
+/// One stop.
+#[derive(Debug, serde::Serialize)]
+struct Stopped {
+    operating_mode: OperatingMode,
+    /// How it was stopped.
+    by: &'static str,
+    /// Speed of the pole's end when it was told to (m/s).
+    speed_m_s: f64,
+    /// From then until every joint stood (s).
+    time_s: f64,
+    /// Way of the pole's end in that time (m).
+    distance_m: f64,
+}
+
+/// The fastest swing that is allowed.
+fn swing(mode: OperatingMode, limits: &Limits, pole: &Pole) -> anyhow::Result<JointTrajectory> {
+    let speed = ArmedSpeed {
+        armed: mode,
+        limits,
+        pole,
+        speeds: OperatingModeSpeeds::default(),
+    };
+    let lasting = |duration_s: f64| {
+        let at = |k: usize| {
+            let part = k as f64 / (WAYPOINTS - 1) as f64;
+            let mut q = START_POSE;
+            // Speed and acceleration are zero at both ends.
+            q[0] += SWING_RAD * part.powi(3) * (part * (6.0 * part - 15.0) + 10.0);
+            (duration_s * part, q)
+        };
+        let (times_s, poses): (Vec<_>, Vec<_>) = (0..WAYPOINTS).map(at).unzip();
+        let swing = JointTrajectory::new(&times_s, &poses).ok()?;
+        let kept = limits.worst_violation(&swing).is_none();
+        (kept && speed.check(&Motion::Spline(swing)).is_ok()).then_some(swing)
+    };
+    let [shortest_s, longest_s] = LASTS_S;
+    let durations = (0..).map(|k| shortest_s * 1.05_f64.powi(k));
+    let mut durations = durations.take_while(|s| *s <= longest_s);
+    durations.find_map(lasting).with_context(|| {
+        format!("joint 1 cannot swing {SWING_RAD} rad from the start pose within the limits")
+    })
+}
+
+/// Swings and stops once, of an arm that stands in the start pose and is armed.
+fn stop(
+    session: &mut Session,
+    link: &ArmLink,
+    arm: SocketAddr,
+    pole: &Pole,
+    swing: &JointTrajectory,
+    (mode, way): (OperatingMode, Way),
+) -> anyhow::Result<Stopped> {
+    let mut line = ArmSession::connect(arm, ANSWERED)?;
+    line.keep_heartbeat();
+    session.tick()?;
+    let motion = link.call(&ControllerRequest::Execute {
+        trajectory: Box::new(*swing),
+        sha256: trajectory_hash(swing),
+    })?;
+    let start_ns = match session.next(&motion, 5.0)? {
+        ControllerEvent::Started { start_ns } => start_ns,
+        other => bail!("the swing did not begin: {other:?}"),
+    };
+    let half_ns = start_ns + (0.5e9 * swing.duration_s()) as u64;
+    while now_ns() < half_ns {
+        session.tick()?;
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let told_ns = now_ns();
+    let by = match way {
+        Way::Brake => {
+            session.ask(link, &ControllerRequest::Stop, 5.0, |_| ())?;
+            "controller's brake"
+        }
+        Way::State4 => {
+            line.stop_arm()?;
+            "arm (state 4)"
+        }
+    };
+    let end = session.finish(&motion, 5.0, |_| ())?;
+    let is_stopped = matches!(end, ControllerEvent::Stopped { .. });
+    ensure!(is_stopped, "the swing was not stopped: {end:?}");
+    session.idle(WATCHED)?;
+    let reports = session.received.cycles.reports();
+    let before = reports.iter().rev().find(|r| r.stamp_ns <= told_ns);
+    let before = *before.context("the arm reported no joints before it was stopped")?;
+    let after = reports.into_iter().filter(|r| r.stamp_ns > told_ns);
+    let after: Vec<JointReport> = after.collect();
+    let moves = |r: &JointReport| r.qd.max_abs() > STILL_RAD_S;
+    let moving = after.iter().rposition(moves).map_or(0, |last| last + 1);
+    let rest = after.get(moving).context("the arm did not come to rest")?;
+    let ends_m = core::iter::once(&before).chain(&after[..=moving]);
+    let ends_m: Vec<_> = ends_m.map(|r| pole.attach_pose(&r.q).0).collect();
+    Ok(Stopped {
+        operating_mode: mode,
+        by,
+        speed_m_s: tool_speed_m_s(&before.q, &before.qd, &pole.end_m()),
+        time_s: 1e-9 * (rest.stamp_ns - told_ns) as f64,
+        distance_m: ends_m
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]).norm())
+            .sum(),
+    })
+}
+
+/// Stops the arm at rising speeds; what was measured is the run's summary.
+pub(super) fn measure(args: &LatencyArgs) -> Outcome<Value> {
+    let Some(address) = reach_measured(&args.arm)? else {
+        return Err(bad_input!(
+            "name the arm with --arm ADDR: its stops are measured while it moves"
+        ));
+    };
+    let limits = limits(&args.arm, Some(&address))?;
+    let pole = config::cell().or_input()?.pole;
+    use OperatingMode::{SetUp, Throw, Wiggle};
+    let swings =
+        [SetUp, Wiggle, Throw].map(|mode| Ok((mode, swing(mode, &limits, &pole).or_input()?)));
+    let swings = swings.into_iter().collect::<Outcome<Vec<_>>>()?;
+    require_clear_area(&args.arm, &address, "MOVE")?;
+    let is_asked = asks(&args.arm, &address);
+    let arm = SocketAddr::new(address.ip, address.command);
+    let work = |session: &mut Session, link: &ArmLink| {
+        let mut stops = Vec::new();
+        for (mode, swing) in &swings {
+            for way in [Way::Brake, Way::State4] {
+                if !stops.is_empty() {
+                    pipeline::enable(session, link, &mut BringUp::default())?;
+                    pipeline::arm_for(session, link, SetUp, None)?;
+                    pipeline::move_to(session, link, START_POSE, MOVE_SPEED)?;
+                }
+                let word = is_asked.then(|| session.confirm("MEASURE")).transpose()?;
+                session.await_hold()?;
+                let stage = Stage::begin("stop");
+                pipeline::arm_for(session, link, *mode, Some(word.unwrap_or_else(now_ns)))?;
+                let stopped = stop(session, link, arm, &pole, swing, (*mode, way))?;
+                session.end_hold();
+                stage.done(&format!(
+                    "{:?}, by the {}: {:.2} m/s to rest in {:.0} ms and {:.0} mm",
+                    mode,
+                    stopped.by,
+                    stopped.speed_m_s,
+                    1e3 * stopped.time_s,
+                    1e3 * stopped.distance_m
+                ));
+                stops.push(stopped);
+            }
+        }
+        show(&stops);
+        Ok(json!({ "command": "latency", "stops": stops }))
+    };
+    let place = (args.out.as_deref(), "stops");
+    let (_, found) = on_arm(
+        &args.arm,
+        address,
+        &limits,
+        START_POSE,
+        place,
+        work,
+        |_, _, value| Ok(value),
+    )?;
+    Ok(found)
+}
+
+fn show(stops: &[Stopped]) {
+    let rows = stops.iter().map(|stop| {
+        [
+            format!("{:?}", stop.operating_mode),
+            format!("{:.2}", stop.speed_m_s),
+            format!("{:.0}", 1e3 * stop.time_s),
+            format!("{:.0}", 1e3 * stop.distance_m),
+            stop.by.to_owned(),
+        ]
+    });
+    let header = [
+        "armed for",
+        "pole's end (m/s)",
+        "time to rest (ms)",
+        "distance (mm)",
+        "stopped by",
+    ];
+    println!("{}", table::numbers(header, 1, rows));
+}
