@@ -21,9 +21,9 @@ mod token;
 pub use facts::domain_of_run;
 
 use crate::report::{arm_points, tenths_mm};
-use arm_model::Cell;
 use ask::{Ask, Open, Requested, hand_over};
 use attached::{Attached, Seen, newest_domain};
+use camera_ingest::preview::PreviewConfig;
 use http::Site;
 use jitter::Jitter;
 use rope::FollowingRope;
@@ -54,17 +54,6 @@ pub enum Wanted {
     /// This domain, whether anything runs there yet or not; results are in the folder,
     /// if it is known.
     Domain(String, Option<PathBuf>),
-}
-
-/// What a preview of the rope looks at.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PreviewView {
-    /// Shared-memory domain of the camera.
-    pub domain: String,
-    /// Its calibration.
-    pub camera: PathBuf,
-    /// The cell that it looks at.
-    pub cell: Cell,
 }
 
 /// What is known of one controller.
@@ -214,7 +203,7 @@ impl Watcher {
 
     /// What a preview of the rope is to look at, through the calibration `named` or else that
     /// of the run; the page tells where there is none.
-    pub fn preview_view(&mut self, named: Option<&Path>) -> Option<PreviewView> {
+    pub fn preview_view(&mut self, named: Option<&Path>) -> Option<PreviewConfig> {
         let attached = self.attached.as_mut()?;
         let facts = attached.controller.as_ref().map(|c| &c.facts);
         let camera = named.map(Path::to_owned);
@@ -222,11 +211,8 @@ impl Watcher {
         if let Some(film) = &mut attached.film {
             film.lacks_calibration = camera.is_none();
         }
-        Some(PreviewView {
-            domain: attached.domain.clone(),
-            camera: camera?,
-            cell: self.here.of_run(facts.and_then(|f| f.cell)),
-        })
+        let cell = self.here.of_run(facts.and_then(|f| f.cell));
+        Some(PreviewConfig::new(&attached.domain, camera?, cell))
     }
 
     /// Whether a preview runs already, whoever started it.
