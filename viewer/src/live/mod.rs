@@ -177,14 +177,9 @@ impl Watcher {
             Wanted::Domain(_, run) => run.clone(),
             Wanted::Newest => None,
         };
-        let had = self
-            .attached
-            .as_ref()
-            .is_some_and(|a| a.controller.is_some());
-        let seen = self
-            .attached
-            .as_mut()
-            .and_then(|attached| attached.look(search, run.as_deref()));
+        let attached = self.attached.as_mut();
+        let had = attached.as_ref().is_some_and(|a| a.controller.is_some());
+        let seen = attached.and_then(|a| a.look(search, run.as_deref()));
         match (had, seen) {
             // Nothing of the one before counts for it.
             (false, Some(_)) => self.shown = Shown::default(),
@@ -239,18 +234,10 @@ impl Watcher {
         }
         let facts = attached.controller.as_ref().map(|c| &c.facts);
         let pole = self.here.of_run(facts.and_then(|f| f.cell)).pole;
-        match facts.and_then(|facts| facts.rope()) {
-            Some((rope, name)) => {
-                if self
-                    .shown
-                    .rope
-                    .as_ref()
-                    .is_none_or(|(r, _)| *r.params() != rope)
-                {
-                    self.shown.rope = Some((FollowingRope::new(rope, pole), name));
-                }
-            }
-            None => self.shown.rope = None,
+        let known = facts.and_then(|facts| facts.rope());
+        let followed = self.shown.rope.as_ref().map(|(rope, _)| *rope.params());
+        if followed != known.map(|(rope, _)| rope) {
+            self.shown.rope = known.map(|(rope, name)| (FollowingRope::new(rope, pole), name));
         }
         if let Some(cycles) = &attached.cycles {
             while let Some(cycle) = cycles.receive()? {
@@ -266,11 +253,8 @@ impl Watcher {
             }
         }
         let camera = facts.and_then(|facts| facts.camera.as_ref());
-        let nodes = self
-            .shown
-            .rope
-            .as_ref()
-            .map_or(&[][..], |(rope, _)| rope.nodes());
+        let rope = self.shown.rope.as_ref();
+        let nodes = rope.map_or(&[][..], |(rope, _)| rope.nodes());
         if let Some(film) = &mut attached.film
             && let Some(picture) = film.turn(self.site.wants_pictures(), camera, nodes)?
         {
@@ -348,11 +332,8 @@ impl Watcher {
             }
             None => snapshot.rope_is = "no rope is identified yet",
         }
-        if self
-            .shown
-            .histograms_at
-            .is_none_or(|at| at.elapsed() >= HISTOGRAMS)
-        {
+        let told = self.shown.histograms_at;
+        if told.is_none_or(|at| at.elapsed() >= HISTOGRAMS) {
             self.shown.histograms_at = Some(Instant::now());
             snapshot.jitter = Some(self.shown.jitter.histograms());
         }
