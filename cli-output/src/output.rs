@@ -18,7 +18,7 @@ macro_rules! print {
 #[macro_export]
 macro_rules! println {
     () => { $crate::output::text(format_args!("\n")) };
-    ($($arg:tt)*) => { $crate::output::line(format_args!($($arg)*)) };
+    ($($arg:tt)*) => { $crate::output::text(format_args!("{}\n", format_args!($($arg)*))) };
 }
 /// As the standard one, without its panic.
 #[macro_export]
@@ -99,11 +99,6 @@ pub fn text(text: fmt::Arguments<'_>) {
     } else {
         state.write(&mut io::stdout(), text.to_string().as_bytes());
     }
-}
-
-/// Prints a line for people.
-pub fn line(line: fmt::Arguments<'_>) {
-    text(format_args!("{line}\n"));
 }
 
 /// Prints to standard error, where nothing can be done about a failure.
