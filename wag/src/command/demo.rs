@@ -13,7 +13,7 @@ use anyhow::{Context, anyhow, bail};
 use arm_model::{JointTrajectory, Limits};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::process::CameraConfig;
-use cli_output::{Failure, OrInput, Outcome, Stage, output, watch_interrupts};
+use cli_output::{OrInput, Outcome, Stage, output, watch_interrupts};
 use planner::PlannerConfig;
 use planner::plan::{check_reach, clear_of_arm};
 use planner::service::{PlannerRequest, PlannerRpc};
@@ -88,9 +88,8 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
     let summary_kept = files::write_json(&folder.file(files::SUMMARY), &record);
     let recorded = session.finish_run_file();
     explain_stop(folder.path());
-    result
-        .with_context(|| format!("run `{}`", folder.path().display()))
-        .map_err(Failure::failed)?;
+    let result = result.with_context(|| format!("run `{}`", folder.path().display()));
+    result.or_failed()?;
     keypoints_kept.or_failed()?;
     show(&record);
     keep_report(folder.path());
