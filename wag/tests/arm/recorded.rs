@@ -3,7 +3,7 @@
 //! no motion.
 
 use super::support::{
-    Rig, alone, command, json, process_of, refused_in, said, send, shared_memory_of, until,
+    Rig, alone, command, has, json, process_of, refused_in, said, send, shared_memory_of, until,
     until_recorded, wag,
 };
 use mcap::{MessageStream, Summary};
@@ -56,9 +56,7 @@ fn replays_exactly(run: &str) -> Value {
 fn page_has(run: &str, words: &[&str]) {
     let page = String::from_utf8(wag(&format!("explain {run}")).stdout).unwrap();
     println!("{page}");
-    for word in words {
-        assert!(page.contains(word), "`{word}` is not in\n{page}");
-    }
+    has(&page, words);
 }
 
 #[test]
@@ -113,8 +111,7 @@ fn others_join(folder: &Path, pid: u32) {
     let out = late.display();
     let line = format!("record --domain {nobody} --seconds 0.1 --out {out}");
     let lost = refused_in(Path::new("."), 1, &line);
-    assert!(lost.contains("no controller runs"), "{lost}");
-    assert!(lost.contains(&domain), "{lost}");
+    has(&lost, &["no controller runs", &domain]);
     assert!(!late.exists(), "nothing recorded, nothing left");
     assert_eq!(shared_memory_of(&nobody), Vec::<String>::new());
 
@@ -275,12 +272,8 @@ fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
     let output = wiggle.wait_with_output().unwrap();
     let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
-    let reported = [
-        "the run continues",
-        "killed by signal 9",
-        "wag record recover",
-    ];
-    assert!(reported.iter().all(|words| said.contains(words)), "{said}");
+    has(&said, &["the run continues", "killed by signal 9"]);
+    has(&said, &["wag record recover"]);
     let reported: Value =
         serde_json::from_slice(&fs::read(run.join("summary.json")).unwrap()).unwrap();
     assert_eq!(reported["ok"], true, "the motion was finished");

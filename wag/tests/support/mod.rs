@@ -49,6 +49,14 @@ pub(crate) fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// All of these words must be in a text.
+#[track_caller]
+pub(crate) fn has(text: &str, words: &[&str]) {
+    for word in words {
+        assert!(text.contains(word), "`{word}` is not in\n{text}");
+    }
+}
+
 /// Runs a command that must succeed; what `--json` prints.
 pub(crate) fn json(line: &str) -> Value {
     json_in(Path::new("."), line)
