@@ -3,8 +3,8 @@
 //! no motion.
 
 use super::support::{
-    Rig, alone, command, has, json, process_of, refused_in, said, send, shared_memory_of, until,
-    until_recorded, wag,
+    Rig, alone, command, ended, has, json, process_of, refused_in, said, send, shared_memory_of,
+    until, until_recorded, wag,
 };
 use mcap::{MessageStream, Summary};
 use rustix::process::Signal;
@@ -67,8 +67,7 @@ fn a_whole_run_lies_in_one_file_that_replays_to_the_bit_and_others_may_join() {
     let path = folder.path().join("run");
     let wiggle = rig.wiggle(&path);
     others_join(folder.path(), wiggle.id());
-    let output = wiggle.wait_with_output().unwrap();
-    assert!(output.status.success(), "{}", said(&output));
+    ended(wiggle, 0);
     let named = folder.path().join("named").display().to_string();
     let found = replays_exactly(&named);
     assert!(found["first_cycle"].as_u64().unwrap() > 1, "{found}");
@@ -197,8 +196,7 @@ fn ledger_knows(runs: &Path, run: &Path, rig: Rig) {
         (made() == 1).then_some(())
     });
     send(again.id(), Signal::INT);
-    let output = again.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    ended(again, 1);
     drop(rig);
     // The arm is gone by now: it fails as it would by hand.
     let gone = refused_in(Path::new("."), 1, &go);
@@ -216,10 +214,8 @@ fn a_stopped_run_is_explained_and_replays_to_the_bit() {
     let rig = Rig::start(&format!("--faults {}", faults.display()));
     let path = folder.path().join("run");
     let run = path.display().to_string();
-    let output = rig.wiggle(&path).wait_with_output().unwrap();
-    let said = said(&output);
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("STOPPED: ArmError"), "{said}");
+    let said = ended(rig.wiggle(&path), 1);
+    has(&said, &["STOPPED: ArmError"]);
 
     let replayed = replays_exactly(&run);
     assert_eq!(replayed["first_cycle"], 1, "{replayed}");
@@ -269,9 +265,7 @@ fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
     let recorder = process_of(&wiggle.id().to_string(), "recorder").unwrap();
     let killed_ns = UNIX_EPOCH.elapsed().unwrap().as_nanos();
     send(recorder, Signal::KILL);
-    let output = wiggle.wait_with_output().unwrap();
-    let said = said(&output);
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let said = ended(wiggle, 1);
     has(&said, &["the run continues", "killed by signal 9"]);
     has(&said, &["wag record recover"]);
     let reported: Value =

@@ -1,7 +1,7 @@
 //! Processes of a whole demo killed while the arm moves.
 
-use super::shell::{recorded, said};
-use crate::support::{alone, command, process_of, send, until};
+use super::shell::recorded;
+use crate::support::{alone, command, ended, has, process_of, send, until};
 use rustix::process::Signal;
 use shared_types::ipc::{Bus, ControllerMode, StateReader};
 use shared_types::{FaultCode, OperatingMode, Plan};
@@ -24,10 +24,8 @@ fn killed(child: Child, run: &Path, victim: &str, after_ms: u64) {
     std::thread::sleep(Duration::from_millis(after_ms));
     let victim_pid = process_of(&run.display().to_string(), victim).unwrap();
     send(victim_pid, Signal::KILL);
-    let (code, said) = said(child);
-    assert_eq!(code, Some(1), "{said}");
     let death = format!("{victim} process was killed by signal 9");
-    assert!(said.contains(&death), "{said}");
+    has(&ended(child, 1), &[&death]);
 }
 
 /// A demo that streams a trajectory of `operating_mode` right now, and its folder in `into`.
@@ -42,10 +40,10 @@ fn demo_in(into: &Path, operating_mode: OperatingMode) -> (Child, PathBuf) {
         if streams(&mut child, &run, operating_mode) {
             return (child, run);
         }
-        let (code, said) = said(child);
+        let said = ended(child, 1);
         assert!(
             TOO_BUSY.iter().any(|cause| said.contains(cause)),
-            "the demo ended before its {operating_mode:?}, exit code {code:?}: {said}"
+            "the demo ended before its {operating_mode:?}: {said}"
         );
         eprintln!("demo {attempt}: {said}");
     }

@@ -1,8 +1,8 @@
 //! A plan is executed identically, byte for byte in the record, with planner and
 //! camera killed half-way.
 
-use super::shell::{arm, on_arm, recorded, said};
-use crate::support::{Running, alone, command, plan_json, until};
+use super::shell::{arm, on_arm, recorded};
+use crate::support::{Running, alone, command, ended, plan_json, until};
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector};
 use camera_ingest::process::CameraConfig;
@@ -148,8 +148,7 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
         camera.kill();
         planner.kill();
     }
-    let (code, said) = said(child);
-    assert_eq!(code, Some(0), "{said}");
+    ended(child, 0);
     let dead = planner.0.try_wait().unwrap().is_some();
     assert_eq!(dead, murder, "killed while the arm moved, or never");
     drop((planned, filmed));

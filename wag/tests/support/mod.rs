@@ -49,6 +49,16 @@ pub(crate) fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// What a child said on both streams, once it has ended as it must, with an exit code.
+#[track_caller]
+pub(crate) fn ended(child: Child, code: i32) -> String {
+    let output = child.wait_with_output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let said = format!("{printed}{}", said(&output));
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    said
+}
+
 /// All of these words must be in a text.
 #[track_caller]
 pub(crate) fn has(text: &str, words: &[&str]) {
