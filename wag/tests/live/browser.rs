@@ -4,9 +4,7 @@
 use super::chromium::Chromium;
 use super::client::Watch;
 use super::fake::{Fake, put_rope, run_folder};
-use super::support::{alone, record, wag};
-use arm_model::JointTrajectory;
-use arm_model::joint::START_POSE;
+use super::support::{alone, record, throw, wag};
 use rt_controller::recording::RecordedCycle;
 use serde_json::{Value, json};
 use shared_types::ipc::{ControllerMode, CycleRecord};
@@ -40,14 +38,7 @@ fn drawn(page: &mut Chromium) -> [f64; 4] {
 
 /// A short throw as a run folder holds it.
 fn throw_folder(run: &Path) {
-    let mut end = START_POSE;
-    end[5] -= 0.9;
-    end[1] -= 0.4;
-    let throw = JointTrajectory::new(
-        &[0.0, 0.5, 1.0],
-        &[START_POSE, (START_POSE + end) * 0.5, end],
-    )
-    .unwrap();
+    let throw = throw([0.4, 0.9]);
     let cycles = (0..250_u32).map(|cycle| {
         let t = f64::from(cycle) * 0.004;
         let record = CycleRecord {

@@ -1,6 +1,7 @@
 //! `wag` as its users start it, a simulated arm to start it against, and what it recorded.
 #![allow(dead_code, reason = "each test uses a part")]
 
+use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, Limits};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use rt_controller::control::{ControlState, Thresholds};
@@ -116,6 +117,15 @@ pub(crate) fn calibrate(folder: &Path, camera: &StereoCamera, mode: VideoMode) -
     write_factory_conf(&folder.join(conf), camera, mode).unwrap();
     write_camera_toml(&path, camera, mode, conf).unwrap();
     path
+}
+
+/// A throw of one second from the start pose: joints 2 and 6 go back by these (rad).
+pub(crate) fn throw(back_rad: [f64; 2]) -> JointTrajectory {
+    let mut end = START_POSE;
+    end[1] -= back_rad[0];
+    end[5] -= back_rad[1];
+    let middle = (START_POSE + end) * 0.5;
+    JointTrajectory::new(&[0.0, 0.5, 1.0], &[START_POSE, middle, end]).unwrap()
 }
 
 /// A plan of a motion as `plan.json` contains it.
