@@ -29,11 +29,8 @@ fn a_full_disk_behind_standard_output_is_one_clear_error() {
     let dir = tempfile::tempdir().unwrap();
     let full = File::options().write(true).open("/dev/full").unwrap();
     let mut command = command("wiggle --csv w.csv");
-    let output = command
-        .current_dir(dir.path())
-        .stdout(full)
-        .output()
-        .unwrap();
+    command.current_dir(dir.path()).stdout(full);
+    let output = command.output().unwrap();
     let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("standard output"), "{said}");

@@ -165,16 +165,11 @@ fn twenty_secret_arms_are_found_within_two_milliseconds_and_ten_percent() {
         let found = identify(&recording, |_| ()).unwrap();
         assert_eq!(found[resting], JointResponse::NotExcited(NotExcited::Still));
         for j in moved {
+            let of = format!("seed {seed} joint {}", j + 1);
             let lag = found[j].lag();
-            let lag = lag.unwrap_or_else(|| {
-                panic!("seed {seed} joint {}: {:?}, {:?}", j + 1, found[j], lags[j])
-            });
+            let lag = lag.unwrap_or_else(|| panic!("{of}: {:?}, {:?}", found[j], lags[j]));
             let error = Errors::of(lag, &lags[j]);
-            assert!(
-                error.is_accepted(),
-                "seed {seed} joint {}: {error:?}",
-                j + 1
-            );
+            assert!(error.is_accepted(), "{of}: {error:?}");
             let hz = lags[j].natural_frequency_rad_s / core::f64::consts::TAU;
             for (count, (estimate, truth)) in inside.iter_mut().zip([
                 (lag.dead_time_s, lags[j].dead_time_s),

@@ -1,6 +1,6 @@
 //! Processes of a whole demo killed while the arm moves.
 
-use super::shell::recorded;
+use super::shell::{last_flight, recorded};
 use crate::support::{alone, command, ended, has, process_of, send, until};
 use rustix::process::Signal;
 use shared_types::ipc::{Bus, ControllerMode, StateReader};
@@ -89,12 +89,7 @@ fn fault_25_a_planner_killed_while_its_plan_runs_changes_nothing_but_the_report(
     let plan = std::fs::read_to_string(run.join("plan.json")).unwrap();
     let plan: Plan = serde_json::from_str(&plan).unwrap();
     let (cycles, causes) = recorded(&run);
-    let throw: Vec<_> = cycles
-        .iter()
-        .rev()
-        .skip_while(|c| c.trajectory_s < 0.0)
-        .take_while(|c| c.trajectory_s >= 0.0)
-        .collect();
+    let throw: Vec<_> = last_flight(&cycles).collect();
     let last_s = throw[0].trajectory_s;
     assert!(last_s > plan.trajectory.duration_s() - 0.005, "{last_s} s");
     for cycle in throw.iter().filter(|c| c.sent != 0) {

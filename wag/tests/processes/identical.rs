@@ -1,7 +1,7 @@
 //! A plan is executed identically, byte for byte in the record, with planner and
 //! camera killed half-way.
 
-use super::shell::{arm, on_arm, recorded};
+use super::shell::{arm, last_flight, on_arm, recorded};
 use crate::support::{Running, alone, command, ended, plan_json, until};
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector};
@@ -158,10 +158,8 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     assert_eq!(met, [(FaultCode::OperatorStop, 0)]);
     let guardian = std::fs::read_to_string(run.join("log/guardian.log")).unwrap();
     assert!(guardian.contains("guarding the controller"), "{guardian}");
-    let is_thrown = |r: &&CycleRecord| r.trajectory_s >= 0.0 && r.sent != 0;
-    let throw = cycles.iter().rev().skip_while(|r| r.trajectory_s < 0.0);
-    let throw = throw.take_while(|r| r.trajectory_s >= 0.0);
-    let mut flown: Vec<_> = throw.filter(is_thrown).copied().collect();
+    let sent = last_flight(&cycles).filter(|r| r.sent != 0);
+    let mut flown: Vec<_> = sent.copied().collect();
     flown.reverse();
     // One that the loop was held up with is held back, by design.
     let went = flown.iter().filter(|r| r.send_ns > 0);

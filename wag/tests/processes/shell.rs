@@ -27,6 +27,12 @@ pub(crate) fn on_arm(arm: &SimulatedArm, line: &str, run: &Path) -> Command {
     command(&format!("{line} --json {address} {ports} --out {out}"))
 }
 
+/// Cycles of the last trajectory that was streamed, the last one first.
+pub(crate) fn last_flight(cycles: &[CycleRecord]) -> impl Iterator<Item = &CycleRecord> {
+    let from_its_end = cycles.iter().rev().skip_while(|c| c.trajectory_s < 0.0);
+    from_its_end.take_while(|c| c.trajectory_s >= 0.0)
+}
+
 /// Cycles and causes of a run's recording.
 pub(crate) fn recorded(run: &Path) -> (Vec<CycleRecord>, Vec<CauseRecord>) {
     let recording = run_log::Run::open(run).unwrap().recording().unwrap();
