@@ -37,7 +37,6 @@ pub(crate) struct Facts {
 }
 
 impl Facts {
-    /// Of a folder, or of none.
     pub(crate) fn of(folder: Option<PathBuf>) -> Self {
         let mut facts = Self {
             folder,

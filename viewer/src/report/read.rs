@@ -51,7 +51,6 @@ pub fn simulated_rope(run: &Path) -> anyhow::Result<Vec<RopeMotion>> {
     Ok(scenes(&known)?.into_iter().map(motion).collect())
 }
 
-/// Reads a run.
 pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData> {
     ensure!(
         run.is_dir(),

@@ -12,7 +12,6 @@ use run_log::Cycles;
 use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::{MonotonicNs, Plan, RopeParams};
 
-/// Frames per second.
 const RATE_HZ: f64 = 60.0;
 /// Shown before a motion (s).
 const BEFORE_S: f64 = 0.2;
@@ -50,7 +49,6 @@ pub(crate) struct Known<'a> {
     pub cell: Cell,
     /// Its cycles and measured joints.
     pub cycles: &'a Cycles,
-    /// The identified rope.
     pub rope: Option<&'a RopeParams>,
     /// The plan of the throw.
     pub plan: Option<&'a Plan>,

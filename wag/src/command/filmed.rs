@@ -68,13 +68,11 @@ impl ClampMotion {
     }
 }
 
-/// A film of a rope.
 #[derive(Debug)]
 pub struct Filmed {
     source: AnySource,
     /// Where it is from.
     pub path: PathBuf,
-    /// What filmed it.
     pub camera: StereoCamera,
     pub motion: ClampMotion,
     /// What is missing or damaged.

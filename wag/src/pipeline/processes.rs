@@ -95,7 +95,6 @@ pub fn start_rig(
     }
 }
 
-/// Where an arm listens.
 #[derive(Debug, Clone)]
 pub struct ArmAddress {
     pub ip: IpAddr,
@@ -104,7 +103,6 @@ pub struct ArmAddress {
     pub joints: u16,
     /// Ports with its status (5 Hz), in the order in which they are tried.
     pub status: [u16; 2],
-    /// Whether it is the simulated arm.
     pub simulated: bool,
     /// How it follows its setpoints, where that is known, and the file that tells it.
     pub arm_response: Option<(PathBuf, ArmResponse)>,

@@ -134,7 +134,6 @@ impl Chromium {
         }
     }
 
-    /// Opens an address.
     pub(crate) fn open(&mut self, url: &str) {
         let went = self.call("Page.navigate", &json!({ "url": url }));
         assert!(went["errorText"].is_null(), "{url}: {went}");

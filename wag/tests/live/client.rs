@@ -10,11 +10,9 @@ use std::time::{Duration, Instant};
 /// A watcher that ends when dropped.
 pub(crate) struct Watch {
     process: Running,
-    /// The page's address.
     pub(crate) url: String,
 }
 
-/// An answer.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) status: u16,
@@ -84,7 +82,6 @@ impl Watch {
         States(reader)
     }
 
-    /// Resident memory of the process (MB).
     pub(crate) fn resident_mb(&self) -> f64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap();
         let line = status.lines().find(|l| l.starts_with("VmRSS:")).unwrap();
@@ -108,7 +105,6 @@ impl Answer {
     }
 }
 
-/// A stream of states.
 pub(crate) struct States(BufReader<TcpStream>);
 
 impl States {

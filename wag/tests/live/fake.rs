@@ -28,9 +28,7 @@ const FRAME_BYTES: usize = (SIZE[0] * SIZE[1] * 2) as usize;
 pub(crate) struct Wires {
     end: AtomicBool,
     operate: AtomicBool,
-    /// Stops asked for so far.
     pub(crate) stops: AtomicUsize,
-    /// Acknowledgements asked for so far.
     pub(crate) acknowledgements: AtomicUsize,
 }
 

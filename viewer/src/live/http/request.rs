@@ -21,7 +21,6 @@ pub(crate) struct Request {
     pub query: String,
     /// The one `Host` line.
     pub host: String,
-    /// The `Origin` line, where there is one.
     pub origin: Option<String>,
     /// Whether another request may follow on this connection.
     pub keep: bool,
