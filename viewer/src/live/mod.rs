@@ -158,7 +158,7 @@ impl Watcher {
 
     fn pass_on(&mut self, requested: Requested) {
         tracing::info!(ask = requested.ask.name(), "requested by a page");
-        let bus = self.attached.as_ref().map(Attached::bus);
+        let bus = self.attached.as_ref().map(|attached| &attached.bus);
         self.open
             .extend(hand_over(requested, bus, self.seen.as_ref()));
     }
@@ -235,7 +235,7 @@ impl Watcher {
         let facts = attached.controller.as_ref().map(|c| &c.facts);
         let pole = self.here.of_run(facts.and_then(|f| f.cell)).pole;
         let known = facts.and_then(|facts| facts.rope());
-        let followed = self.shown.rope.as_ref().map(|(rope, _)| *rope.params());
+        let followed = self.shown.rope.as_ref().map(|(rope, _)| rope.params);
         if followed != known.map(|(rope, _)| rope) {
             self.shown.rope = known.map(|(rope, name)| (FollowingRope::new(rope, pole), name));
         }
@@ -300,7 +300,7 @@ impl Watcher {
         };
         let facts = attached.controller.as_ref().map(|c| &c.facts);
         snapshot.cell = self.here.of_run(facts.and_then(|f| f.cell));
-        let folder = facts.and_then(|facts| facts.folder()?.file_name());
+        let folder = facts.and_then(|facts| facts.folder.as_ref()?.file_name());
         snapshot.title = match folder {
             Some(name) => format!("{} (domain {})", name.display(), attached.domain),
             None => format!("domain {}", attached.domain),
@@ -328,7 +328,7 @@ impl Watcher {
             Some((rope, name)) => {
                 snapshot.rope = rope.nodes().iter().flat_map(tenths_mm).collect();
                 snapshot.rope_is = name;
-                snapshot.radii_m = [rope.params().radius_m, rope.params().lead_radius_m];
+                snapshot.radii_m = [rope.params.radius_m, rope.params.lead_radius_m];
             }
             None => snapshot.rope_is = "no rope is identified yet",
         }

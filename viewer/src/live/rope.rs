@@ -22,7 +22,7 @@ struct Knot {
 /// The rope, and the last joints it has heard of.
 #[derive(Debug)]
 pub(crate) struct FollowingRope {
-    params: RopeParams,
+    pub params: RopeParams,
     pole: Pole,
     live: Option<LiveRope>,
     /// When the simulation's clock began (CLOCK_MONOTONIC, ns).
@@ -41,10 +41,6 @@ impl FollowingRope {
             began_ns: 0,
             knots: Vec::with_capacity(4),
         }
-    }
-
-    pub(crate) fn params(&self) -> &RopeParams {
-        &self.params
     }
 
     /// Nodes in metres, attach point first; none before the first report or when the

@@ -15,9 +15,8 @@ fn kind_name(kind: LimitKind) -> &'static str {
     match kind {
         LimitKind::PositionMin => "position, lower",
         LimitKind::PositionMax => "position, upper",
-        LimitKind::Velocity => "speed",
+        LimitKind::Velocity | LimitKind::TcpSpeed => "speed",
         LimitKind::Acceleration => "acceleration",
-        LimitKind::TcpSpeed => "speed",
     }
 }
 

@@ -26,7 +26,11 @@ fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
                 "joint {joint}: {text}"
             );
             let error = Errors::of(found.lag()?, &secrets[joint - 1]);
-            assert!(error.is_plausible(), "joint {joint}: {error:?}\n{text}");
+            // Two cycles and a quarter: a shared machine's wake-ups blur the measurement itself.
+            assert!(
+                error.are_below(8e-3, 0.25),
+                "joint {joint}: {error:?}\n{text}"
+            );
             Some(error)
         })
         .collect();
