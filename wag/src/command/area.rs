@@ -58,10 +58,9 @@ pub fn reach_measured(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
     let named = arm.arm_response.clone();
     let places: Vec<PathBuf> = config::arm_response_files().or_input()?.collect();
     let here = || {
-        let mut there = places
-            .iter()
-            .filter(|file| file.try_exists().unwrap_or(true));
-        there.next().cloned().filter(|_| !address.simulated)
+        let mut places = places.iter();
+        let there = places.find(|file| file.try_exists().unwrap_or(true));
+        there.cloned().filter(|_| !address.simulated)
     };
     let Some(path) = named.clone().or_else(here) else {
         if address.simulated {

@@ -114,16 +114,13 @@ fn others_join(folder: &Path, pid: u32) {
     assert!(!late.exists(), "nothing recorded, nothing left");
     assert_eq!(shared_memory_of(&nobody), Vec::<String>::new());
 
-    let reported = json(&format!(
-        "record {} --seconds 1.5 --out {out}",
-        run.display()
-    ));
+    let line = format!("record {} --seconds 1.5 --out {out}", run.display());
+    let reported = json(&line);
     assert_eq!(reported["domain"], domain.as_str());
     assert!(reported["recording"]["chunks"].as_u64().unwrap() > 0);
     let named = folder.join("named").display().to_string();
-    json(&format!(
-        "record --domain {domain} --seconds 2 --out {named}"
-    ));
+    let line = format!("record --domain {domain} --seconds 2 --out {named}");
+    json(&line);
 }
 
 /// It opens with other readers, and its tables are those of the recorded cycles.
@@ -143,11 +140,8 @@ fn its_file_is_whole(run: &Path) {
     let exact = replayed["cycles"].as_u64().unwrap();
     assert!(exact > 1000, "{replayed}");
     // No folder: a file, which is left as it is.
-    let said = refused_in(
-        Path::new("."),
-        2,
-        &format!("export csv {name} --out {}", file.display()),
-    );
+    let export = format!("export csv {name} --out {}", file.display());
+    let said = refused_in(Path::new("."), 2, &export);
     assert!(said.contains("run.mcap"), "{said}");
     assert_eq!(fs::read(&file).unwrap(), bytes);
     let tables = json(&format!("export csv {name}"));
@@ -183,10 +177,9 @@ fn ledger_knows(runs: &Path, run: &Path, rig: Rig) {
     let again = json(&format!("ledger rerun {run}"));
     let words: Vec<String> = serde_json::from_value(again["arguments"].clone()).unwrap();
     assert_eq!(words[..2], ["wiggle", "--arm"]);
-    assert!(
-        !words.contains(&"--out".to_owned()) && !words.contains(&run),
-        "{words:?}"
-    );
+    for word in ["--out", &run] {
+        assert!(!words.iter().any(|w| w == word), "{words:?}");
+    }
     let same = json(&format!("ledger compare {run} {run}"));
     assert_eq!(same["differences"], Value::Array(Vec::new()));
     let go = format!("ledger rerun {run} --go");
@@ -226,10 +219,8 @@ fn a_stopped_run_is_explained_and_replays_to_the_bit() {
     assert_eq!(stops.len(), 1, "{found:#}");
     let stop = &stops[0];
     assert_eq!(stop["arm_error"], 31, "{stop:#}");
-    assert!(
-        stop["cycles_around"].as_array().unwrap().len() >= 8,
-        "{stop:#}"
-    );
+    let around = stop["cycles_around"].as_array().unwrap();
+    assert!(around.len() >= 8, "{stop:#}");
     let kept: Value = serde_json::from_slice(&fs::read(path.join("cause.json")).unwrap()).unwrap();
     assert_eq!(&kept, found);
     page_has(&run, &["what happened", "what to do", "until ms", "C31"]);

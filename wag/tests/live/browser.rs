@@ -171,10 +171,8 @@ fn the_live_page_follows_a_run_and_stops_it() {
     assert!(drawn_hz >= drawn_wanted_hz, "drew {drawn_hz} a second");
     assert_eq!(page.value("document.getElementById('picture').width"), 128);
     // Without an operator there is nothing but the stop, and the page says why.
-    assert_eq!(
-        page.value("document.querySelectorAll('#asks button').length"),
-        1
-    );
+    let buttons = page.value("document.querySelectorAll('#asks button').length");
+    assert_eq!(buttons, 1);
     let why = page.value("document.getElementById('asknote').textContent");
     assert!(why.as_str().unwrap().contains("no operator"), "{why}");
     page.value("document.getElementById('stop').click()");

@@ -98,10 +98,8 @@ impl Watch {
 impl Answer {
     /// What stands behind a name in its head.
     pub(crate) fn line(&self, name: &str) -> Option<&str> {
-        let lines = self.head.lines().filter_map(|l| l.split_once(": "));
-        lines
-            .into_iter()
-            .find_map(|(n, v)| (n == name).then_some(v))
+        let mut lines = self.head.lines().filter_map(|l| l.split_once(": "));
+        lines.find_map(|(n, v)| (n == name).then_some(v))
     }
 }
 

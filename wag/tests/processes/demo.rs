@@ -8,6 +8,7 @@ use shared_types::{FaultCode, OperatingMode, Plan};
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::time::Duration;
+use viewer::live::domain_of_run;
 
 /// Longest wait for a stage of a demo.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -53,11 +54,11 @@ fn demo_in(into: &Path, operating_mode: OperatingMode) -> (Child, PathBuf) {
 /// Waits until the demo `child` streams a trajectory of `operating_mode`; `false` when it
 /// ended before.
 fn streams(child: &mut Child, run: &Path, operating_mode: OperatingMode) -> bool {
-    let config = run.join("config/rt-controller.toml");
     let mut state: Option<StateReader> = None;
     until("the motion", PATIENCE, || {
         if state.is_none() {
-            state = domain(&config)
+            state = domain_of_run(run)
+                .ok()
                 .and_then(|domain| Bus::join(&domain).ok())
                 .and_then(|bus| StateReader::open(&bus).ok());
         }
@@ -69,13 +70,6 @@ fn streams(child: &mut Child, run: &Path, operating_mode: OperatingMode) -> bool
         let mut ended = || child.try_wait().unwrap().is_some();
         (streams || ended()).then_some(streams)
     })
-}
-
-/// Where the processes of a demo meet, once its controller is configured.
-fn domain(config: &Path) -> Option<String> {
-    let text = std::fs::read_to_string(config).ok()?;
-    let table: toml::Table = toml::from_str(&text).ok()?;
-    Some(table.get("domain")?.as_str()?.to_owned())
 }
 
 #[test]

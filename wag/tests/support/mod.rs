@@ -193,11 +193,8 @@ pub(crate) fn processes_of(run_or_parent: &str) -> Vec<(u32, String)> {
 
 /// One of them by its name, `None` while it is not there.
 pub(crate) fn process_of(run_or_parent: &str, name: &str) -> Option<u32> {
-    let found = processes_of(run_or_parent);
-    found
-        .into_iter()
-        .find(|(_, n)| n == name)
-        .map(|(pid, _)| pid)
+    let mut found = processes_of(run_or_parent).into_iter();
+    found.find_map(|(pid, n)| (n == name).then_some(pid))
 }
 
 /// Waits until so many control cycles lie in the file of a run under way.
