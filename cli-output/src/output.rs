@@ -175,9 +175,7 @@ mod tests {
         let mut state = State::NEW;
         state.write(&mut Ends(0, ErrorKind::StorageFull), b"four");
         state.write(&mut Ends(0, ErrorKind::Other), b"four");
-        assert_eq!(
-            state.failed,
-            Some(io::Error::from(ErrorKind::StorageFull).to_string())
-        );
+        let full = io::Error::from(ErrorKind::StorageFull).to_string();
+        assert_eq!(state.failed, Some(full));
     }
 }

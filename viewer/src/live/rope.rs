@@ -141,10 +141,8 @@ mod tests {
         let tip = nodes.position(0, nodes.nodes() - 1);
         let apart_m = (rope_live.nodes().last().unwrap() - tip).norm();
         let moved_m = (rope_live.nodes().last().unwrap() - FollowingRope::at_rest(&rope)).norm();
-        assert!(
-            apart_m < 0.01 && moved_m > 0.05,
-            "{apart_m} m apart, moved {moved_m} m"
-        );
+        assert!(apart_m < 0.01, "{apart_m} m apart");
+        assert!(moved_m > 0.05, "moved {moved_m} m");
     }
 
     impl FollowingRope {

@@ -91,10 +91,8 @@ mod tests {
             note_stop(&mut stop, raw, cycle);
         }
         let kept = stop.clone().unwrap();
-        assert_eq!(
-            (kept.code, kept.cycle, kept.latched),
-            (FaultCode::OperatorStop, 10, false)
-        );
+        assert_eq!(kept.code, FaultCode::OperatorStop);
+        assert_eq!((kept.cycle, kept.latched), (10, false));
         note_stop(&mut stop, 1, 20);
         let again = stop.unwrap();
         assert_eq!((again.cycle, again.latched), (20, true));

@@ -158,10 +158,8 @@ fn twenty_secret_arms_are_found_within_two_milliseconds_and_ten_percent() {
         let delay = command_to_target(&recording).unwrap();
         let [low, high] = delay.interval_s;
         // The wire took 0.1 to 0.4 ms; reports may keep step with setpoints.
-        assert!(
-            low < 4e-4 && high > 1e-4 && high < 5e-3,
-            "seed {seed}: {delay:?}"
-        );
+        assert!(low < 4e-4, "seed {seed}: {delay:?}");
+        assert!(high > 1e-4 && high < 5e-3, "seed {seed}: {delay:?}");
         let found = identify(&recording, |_| ()).unwrap();
         assert_eq!(found[resting], JointResponse::NotExcited(NotExcited::Still));
         for j in moved {

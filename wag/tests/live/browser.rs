@@ -156,10 +156,8 @@ fn the_live_page_follows_a_run_and_stops_it() {
     eprintln!(
         "told {reported_hz:.1} times a second, drew {drawn_hz:.1} in {span_s:.0} s, at most {most_mb:.1} MB"
     );
-    assert!(
-        before[0] > 3000.0 && before[1] > 50.0 && moved > 2.0,
-        "{before:?}, moved {moved}"
-    );
+    assert!(before[0] > 3000.0 && before[1] > 50.0, "{before:?}");
+    assert!(moved > 2.0, "moved {moved}");
     assert!(most_mb < 150.0, "{most_mb} MB");
     // How fast a busy processor tells and draws is no matter of the program; that it does
     // is. The long run is for a machine of its own.

@@ -132,10 +132,8 @@ impl States {
 fn head(reader: &mut BufReader<TcpStream>) -> String {
     let mut head = String::new();
     while !head.ends_with("\r\n\r\n") {
-        assert!(
-            reader.read_line(&mut head).unwrap() > 0,
-            "no answer: {head}"
-        );
+        let read = reader.read_line(&mut head).unwrap();
+        assert!(read > 0, "no answer: {head}");
     }
     head
 }

@@ -42,10 +42,8 @@ fn demo_in(into: &Path, operating_mode: OperatingMode) -> (Child, PathBuf) {
             return (child, run);
         }
         let said = ended(child, 1);
-        assert!(
-            TOO_BUSY.iter().any(|cause| said.contains(cause)),
-            "the demo ended before its {operating_mode:?}: {said}"
-        );
+        let busy = TOO_BUSY.iter().any(|cause| said.contains(cause));
+        assert!(busy, "it ended before its {operating_mode:?}: {said}");
         eprintln!("demo {attempt}: {said}");
     }
     panic!("three demos found the machine too busy");

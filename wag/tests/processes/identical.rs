@@ -127,10 +127,8 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     let began = xarm_sim::clock::now();
     let state = until("the controller", PATIENCE, || StateReader::open(&bus).ok());
     let streams = until("the throw", PATIENCE, || {
-        assert!(
-            child.try_wait().unwrap().is_none(),
-            "ended before its throw"
-        );
+        let over = child.try_wait().unwrap();
+        assert_eq!(over, None, "ended before its throw");
         let now = state.get();
         let is_throw = now.operating_mode == OperatingMode::Throw as u8;
         (is_throw && now.mode == ControllerMode::Streaming as u8).then_some(now.cycle)

@@ -115,10 +115,8 @@ fn a_rehearsal_is_confirmed_in_the_start_pose_and_its_record_says_by_whom() {
     let confirmed = &summary["confirmed"][0];
     assert_eq!(confirmed["word"], "WIGGLE", "{summary:#}");
     let ns = |value: &Value| value.as_u64().unwrap();
-    assert!(
-        ns(&confirmed["at_ns"]) < ns(&summary["start_ns"]),
-        "{summary:#}"
-    );
+    let [confirmed_ns, start_ns] = [ns(&confirmed["at_ns"]), ns(&summary["start_ns"])];
+    assert!(confirmed_ns < start_ns, "{summary:#}");
     let steps = summary["bring_up"].as_array().unwrap();
     let named = |name: &str| steps.iter().any(|s| s["step"] == name);
     assert!(named("identify") && named("enable"), "{summary:#}");
