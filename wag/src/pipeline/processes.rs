@@ -43,7 +43,7 @@ pub fn start_recorder(
     let config = RecorderConfig {
         target_m,
         camera: camera.cloned(),
-        ..RecorderConfig::of_run(&folder.domain, folder.path(), limits, cell)
+        ..RecorderConfig::of_run(&folder.domain, &folder.path, limits, cell)
     };
     let spec = ProcessSpec {
         name: "recorder",

@@ -110,7 +110,7 @@ impl DemoRecord {
             command: "demo",
             version: shared_types::VERSION,
             seed,
-            run: folder.path().display().to_string(),
+            run: folder.path.display().to_string(),
             task: "strike",
             target_m,
             ..Self::default()
