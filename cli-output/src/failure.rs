@@ -1,6 +1,5 @@
 //! How a command fails: its exit code and its one sentence.
 
-use crate::nearest::suggestion;
 use std::{fmt, io};
 
 /// A [`Failure`] for wrong usage or input: exit code 2.
@@ -80,6 +79,23 @@ impl fmt::Display for Failure {
     }
 }
 
+/// Edits up to which a name counts as a slip of another.
+const SLIP: usize = 3;
+
+/// What a refusal of an unknown key should have said too, if a known one is near.
+///
+/// The refusal names the key and the known ones in backticks, as serde does.
+fn suggestion(refusal: &str) -> Option<String> {
+    let named = refusal.split_once("unknown field ")?.1;
+    let mut names = named.split('`').skip(1).step_by(2);
+    let unknown = names.next()?;
+    names
+        .map(|known| (strsim::damerau_levenshtein(unknown, known), known))
+        .filter(|(edits, known)| *edits <= SLIP && *edits < known.len())
+        .min()
+        .map(|(_, known)| format!("did you mean `{known}`?"))
+}
+
 /// Errors that are the caller's input by default.
 pub trait OrInput<T> {
     /// Marks the error as bad input.
@@ -110,5 +126,16 @@ mod tests {
         let failure = Failure::input(error);
         assert_eq!(failure.to_string(), "while reading x: root cause");
         assert_eq!(failure.exit_code(), 2);
+    }
+
+    #[test]
+    fn a_slip_is_told_and_a_stranger_is_not() {
+        let refusal =
+            "unknown field `populaton`, expected one of `dimensions`, `population`, `seed`";
+        let told = suggestion(refusal);
+        assert_eq!(told.as_deref(), Some("did you mean `population`?"));
+        let stranger = "unknown field `frobnicate`, expected `dimensions` or `seed`";
+        assert_eq!(suggestion(stranger), None);
+        assert_eq!(suggestion("missing field `seed`"), None);
     }
 }

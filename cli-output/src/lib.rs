@@ -14,7 +14,6 @@ pub mod output;
 #[macro_use]
 mod failure;
 mod machine;
-mod nearest;
 mod program;
 mod progress;
 pub mod table;

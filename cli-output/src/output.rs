@@ -18,7 +18,7 @@ macro_rules! print {
 #[macro_export]
 macro_rules! println {
     () => { $crate::output::text(format_args!("\n")) };
-    ($($arg:tt)*) => { $crate::output::line(format_args!($($arg)*)) };
+    ($($arg:tt)*) => { $crate::output::text(format_args!("{}\n", format_args!($($arg)*))) };
 }
 /// As the standard one, without its panic.
 #[macro_export]
@@ -101,11 +101,6 @@ pub fn text(text: fmt::Arguments<'_>) {
     }
 }
 
-/// Prints a line for people.
-pub fn line(line: fmt::Arguments<'_>) {
-    text(format_args!("{line}\n"));
-}
-
 /// Prints to standard error, where nothing can be done about a failure.
 pub fn aside(text: fmt::Arguments<'_>) {
     let _ = io::stderr().write_all(text.to_string().as_bytes());
@@ -180,9 +175,7 @@ mod tests {
         let mut state = State::NEW;
         state.write(&mut Ends(0, ErrorKind::StorageFull), b"four");
         state.write(&mut Ends(0, ErrorKind::Other), b"four");
-        assert_eq!(
-            state.failed,
-            Some(io::Error::from(ErrorKind::StorageFull).to_string())
-        );
+        let full = io::Error::from(ErrorKind::StorageFull).to_string();
+        assert_eq!(state.failed, Some(full));
     }
 }

@@ -383,10 +383,8 @@ mod tests {
         assert_eq!(demo(&["wag", "demo"]), 1);
         assert_eq!(demo(&["wag", "demo", "--seed", "7"]), 7);
         assert_eq!(demo(&["wag", "--seed", "7", "demo"]), 7);
-        assert_eq!(
-            of(&["wag", "check", "p", "--seed", "3"]).unwrap().seed,
-            Some(3)
-        );
+        let check = of(&["wag", "check", "p", "--seed", "3"]).unwrap();
+        assert_eq!(check.seed, Some(3));
         for line in ["ledger --seed 3", "ledger --seed-is 3", "--seed 3 ledger"] {
             let line = ["wag"].into_iter().chain(line.split(' '));
             let Command::Ledger(args) = Cli::try_parse_from(line).unwrap().command else {

@@ -71,10 +71,8 @@ fn the_report_tells_who_did_what() {
             continue;
         };
         assert_eq!(reading["by"], "model");
-        assert!(
-            reading["file"].as_str().unwrap().ends_with(model),
-            "{reading}"
-        );
+        let file = reading["file"].as_str().unwrap();
+        assert!(file.ends_with(model), "{reading}");
         let bytes = std::fs::read(dir.path().join(model)).unwrap();
         assert_eq!(reading["sha256"], graph_sha256(&bytes));
         let text = std::fs::read_to_string(dir.path().join("keypoints.json")).unwrap();

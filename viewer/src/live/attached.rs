@@ -101,7 +101,7 @@ pub(crate) struct Attached {
     /// Joints as measured.
     pub joints: Option<JointSubscriber>,
     pub film: Option<Film>,
-    bus: Bus,
+    pub bus: Bus,
     _sweep: DomainSweep,
     pub domain: String,
 }
@@ -126,10 +126,6 @@ impl Attached {
             _sweep: sweep,
             domain: domain.to_owned(),
         })
-    }
-
-    pub(crate) fn bus(&self) -> &Bus {
-        &self.bus
     }
 
     /// What the controller shows. One that has ended is let go; one that is new is

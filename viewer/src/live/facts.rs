@@ -26,7 +26,7 @@ pub fn domain_of_run(run: &Path) -> anyhow::Result<String> {
 /// Facts of one run folder, read again when a file changes.
 #[derive(Debug, Default)]
 pub(crate) struct Facts {
-    folder: Option<PathBuf>,
+    pub folder: Option<PathBuf>,
     stamps: [Option<SystemTime>; 4],
     identified: Option<RopeParams>,
     plan: Option<Plan>,
@@ -37,7 +37,6 @@ pub(crate) struct Facts {
 }
 
 impl Facts {
-    /// Of a folder, or of none.
     pub(crate) fn of(folder: Option<PathBuf>) -> Self {
         let mut facts = Self {
             folder,
@@ -45,10 +44,6 @@ impl Facts {
         };
         facts.look();
         facts
-    }
-
-    pub(crate) fn folder(&self) -> Option<&Path> {
-        self.folder.as_deref()
     }
 
     /// The file of the camera's calibration, where it lies in the folder.

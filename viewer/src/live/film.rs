@@ -27,7 +27,6 @@ const SAME_FRAME_NS: u64 = 1_000_000;
 /// A picture that waited longer for its keypoints is not shown any more (ns).
 const OLD_NS: u64 = 500_000_000;
 
-/// A picture for the page.
 #[derive(Debug, Default)]
 pub(crate) struct Picture {
     /// The left eye.
@@ -66,7 +65,6 @@ pub(crate) struct Film {
     kept_bytes: usize,
     /// Tracked frames still to be shown.
     tracked: VecDeque<KeypointFrame>,
-    /// What a preview tells.
     pub preview: Received,
     /// The picture that waits for its keypoints.
     waits: Option<Live>,
@@ -78,7 +76,6 @@ pub(crate) struct Film {
 }
 
 impl Film {
-    /// Listens in a domain.
     pub(crate) fn open(bus: &Bus) -> anyhow::Result<Self> {
         Ok(Self {
             frames: bus.frame_subscriber()?,

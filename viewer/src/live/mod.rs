@@ -21,9 +21,9 @@ mod token;
 pub use facts::domain_of_run;
 
 use crate::report::{arm_points, tenths_mm};
-use arm_model::Cell;
 use ask::{Ask, Open, Requested, hand_over};
 use attached::{Attached, Seen, newest_domain};
+use camera_ingest::preview::PreviewConfig;
 use http::Site;
 use jitter::Jitter;
 use rope::FollowingRope;
@@ -54,17 +54,6 @@ pub enum Wanted {
     /// This domain, whether anything runs there yet or not; results are in the folder,
     /// if it is known.
     Domain(String, Option<PathBuf>),
-}
-
-/// What a preview of the rope looks at.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PreviewView {
-    /// Shared-memory domain of the camera.
-    pub domain: String,
-    /// Its calibration.
-    pub camera: PathBuf,
-    /// The cell that it looks at.
-    pub cell: Cell,
 }
 
 /// What is known of one controller.
@@ -169,7 +158,7 @@ impl Watcher {
 
     fn pass_on(&mut self, requested: Requested) {
         tracing::info!(ask = requested.ask.name(), "requested by a page");
-        let bus = self.attached.as_ref().map(Attached::bus);
+        let bus = self.attached.as_ref().map(|attached| &attached.bus);
         self.open
             .extend(hand_over(requested, bus, self.seen.as_ref()));
     }
@@ -188,14 +177,9 @@ impl Watcher {
             Wanted::Domain(_, run) => run.clone(),
             Wanted::Newest => None,
         };
-        let had = self
-            .attached
-            .as_ref()
-            .is_some_and(|a| a.controller.is_some());
-        let seen = self
-            .attached
-            .as_mut()
-            .and_then(|attached| attached.look(search, run.as_deref()));
+        let attached = self.attached.as_mut();
+        let had = attached.as_ref().is_some_and(|a| a.controller.is_some());
+        let seen = attached.and_then(|a| a.look(search, run.as_deref()));
         match (had, seen) {
             // Nothing of the one before counts for it.
             (false, Some(_)) => self.shown = Shown::default(),
@@ -214,7 +198,7 @@ impl Watcher {
 
     /// What a preview of the rope is to look at, through the calibration `named` or else that
     /// of the run; the page tells where there is none.
-    pub fn preview_view(&mut self, named: Option<&Path>) -> Option<PreviewView> {
+    pub fn preview_view(&mut self, named: Option<&Path>) -> Option<PreviewConfig> {
         let attached = self.attached.as_mut()?;
         let facts = attached.controller.as_ref().map(|c| &c.facts);
         let camera = named.map(Path::to_owned);
@@ -222,11 +206,8 @@ impl Watcher {
         if let Some(film) = &mut attached.film {
             film.lacks_calibration = camera.is_none();
         }
-        Some(PreviewView {
-            domain: attached.domain.clone(),
-            camera: camera?,
-            cell: self.here.of_run(facts.and_then(|f| f.cell)),
-        })
+        let cell = self.here.of_run(facts.and_then(|f| f.cell));
+        Some(PreviewConfig::new(&attached.domain, camera?, cell))
     }
 
     /// Whether a preview runs already, whoever started it.
@@ -253,18 +234,10 @@ impl Watcher {
         }
         let facts = attached.controller.as_ref().map(|c| &c.facts);
         let pole = self.here.of_run(facts.and_then(|f| f.cell)).pole;
-        match facts.and_then(|facts| facts.rope()) {
-            Some((rope, name)) => {
-                if self
-                    .shown
-                    .rope
-                    .as_ref()
-                    .is_none_or(|(r, _)| *r.params() != rope)
-                {
-                    self.shown.rope = Some((FollowingRope::new(rope, pole), name));
-                }
-            }
-            None => self.shown.rope = None,
+        let known = facts.and_then(|facts| facts.rope());
+        let followed = self.shown.rope.as_ref().map(|(rope, _)| rope.params);
+        if followed != known.map(|(rope, _)| rope) {
+            self.shown.rope = known.map(|(rope, name)| (FollowingRope::new(rope, pole), name));
         }
         if let Some(cycles) = &attached.cycles {
             while let Some(cycle) = cycles.receive()? {
@@ -280,11 +253,8 @@ impl Watcher {
             }
         }
         let camera = facts.and_then(|facts| facts.camera.as_ref());
-        let nodes = self
-            .shown
-            .rope
-            .as_ref()
-            .map_or(&[][..], |(rope, _)| rope.nodes());
+        let rope = self.shown.rope.as_ref();
+        let nodes = rope.map_or(&[][..], |(rope, _)| rope.nodes());
         if let Some(film) = &mut attached.film
             && let Some(picture) = film.turn(self.site.wants_pictures(), camera, nodes)?
         {
@@ -330,7 +300,7 @@ impl Watcher {
         };
         let facts = attached.controller.as_ref().map(|c| &c.facts);
         snapshot.cell = self.here.of_run(facts.and_then(|f| f.cell));
-        let folder = facts.and_then(|facts| facts.folder()?.file_name());
+        let folder = facts.and_then(|facts| facts.folder.as_ref()?.file_name());
         snapshot.title = match folder {
             Some(name) => format!("{} (domain {})", name.display(), attached.domain),
             None => format!("domain {}", attached.domain),
@@ -358,15 +328,12 @@ impl Watcher {
             Some((rope, name)) => {
                 snapshot.rope = rope.nodes().iter().flat_map(tenths_mm).collect();
                 snapshot.rope_is = name;
-                snapshot.radii_m = [rope.params().radius_m, rope.params().lead_radius_m];
+                snapshot.radii_m = [rope.params.radius_m, rope.params.lead_radius_m];
             }
             None => snapshot.rope_is = "no rope is identified yet",
         }
-        if self
-            .shown
-            .histograms_at
-            .is_none_or(|at| at.elapsed() >= HISTOGRAMS)
-        {
+        let told = self.shown.histograms_at;
+        if told.is_none_or(|at| at.elapsed() >= HISTOGRAMS) {
             self.shown.histograms_at = Some(Instant::now());
             snapshot.jitter = Some(self.shown.jitter.histograms());
         }

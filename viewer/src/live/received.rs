@@ -22,7 +22,6 @@ pub(crate) struct Received {
 }
 
 impl Received {
-    /// Listens in a domain.
     pub(crate) fn open(bus: &Bus) -> Result<Self, IpcError> {
         Ok(Self {
             port: bus.preview_subscriber()?,

@@ -18,7 +18,6 @@ pub(crate) struct ReportData {
     pub summary: Value,
     /// Tip and target.
     pub error: Errors,
-    /// The identified rope.
     pub rope: Vec<RopeRow>,
     /// Margins of the plan, as planned.
     pub plan_margins: Vec<Margin>,
@@ -26,9 +25,7 @@ pub(crate) struct ReportData {
     pub explanation: Option<Explanation>,
     /// The same stops as text, if there were any.
     pub cause: Option<String>,
-    /// Times of the control loop.
     pub latency: Vec<Histogram>,
-    /// Motions to look at.
     pub scenes: Vec<Scene>,
     /// Film with the rope drawn in.
     pub pictures: Vec<Picture>,
@@ -54,10 +51,8 @@ pub(crate) struct Errors {
 /// One parameter of the rope.
 #[derive(Debug, Serialize)]
 pub(crate) struct RopeRow {
-    /// Name for people.
     pub label: &'static str,
     pub unit: &'static str,
-    /// Identified value.
     pub value: f64,
     /// Interval that holds it with a probability of 90 %.
     pub interval_90: Option<[f64; 2]>,
@@ -89,7 +84,6 @@ pub struct Histogram {
 /// One motion: pictures of arm and rope, and its joints as numbers.
 #[derive(Debug, Serialize)]
 pub(crate) struct Scene {
-    /// Name for people.
     pub name: String,
     /// When the motion began.
     #[serde(skip)]
@@ -109,7 +103,6 @@ pub(crate) struct Scene {
     /// Radius of the rope and of its lead (m).
     pub radii_m: [f64; 2],
     pub target_m: Option<[f64; 3]>,
-    /// Joints over time.
     pub joints: Joints,
 }
 
@@ -130,7 +123,6 @@ pub(crate) struct Joints {
 pub(crate) struct Picture {
     /// File it was made from.
     pub file: &'static str,
-    /// What it shows.
     pub title: &'static str,
     /// JPEG as a data URL.
     pub url: String,

@@ -68,10 +68,8 @@ mod tests {
         assert_eq!(found.counts.iter().sum::<usize>(), 201);
         assert_eq!(found.counts[0], 4, "1 to 4 µs");
         assert_eq!(*found.counts.last().unwrap(), 1, "beyond the last end");
-        assert_eq!(
-            (found.p50_us, found.p99_us, found.max_us),
-            (101.0, 199.0, 1e6)
-        );
+        assert_eq!((found.p50_us, found.p99_us), (101.0, 199.0));
+        assert_eq!(found.max_us, 1e6);
         assert!(histogram("x", Vec::new()).is_none());
     }
 }

@@ -23,9 +23,6 @@ use page::SIZE_MAX_BYTES;
 use run_log::{CellHere, files};
 use std::path::{Path, PathBuf};
 
-/// Name of the report in a run folder.
-pub const REPORT_FILE: &str = "report.html";
-
 /// A report that was written.
 #[derive(Debug)]
 pub struct Written {
@@ -52,7 +49,7 @@ pub fn write(run: &Path, out: Option<&Path>, here: &CellHere) -> anyhow::Result<
         run.display(),
         html.len()
     );
-    let path = out.map_or_else(|| run.join(REPORT_FILE), Path::to_owned);
+    let path = out.map_or_else(|| run.join("report.html"), Path::to_owned);
     files::write_atomic(&path, html.as_bytes())?;
     Ok(Written {
         path,

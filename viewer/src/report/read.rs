@@ -19,10 +19,8 @@ const SCENES_MAX: usize = 6;
 /// The first motions of a run.
 fn scenes(known: &Known<'_>) -> anyhow::Result<Vec<Scene>> {
     let motions = motions(&known.cycles.cycles).into_iter().take(SCENES_MAX);
-    let scenes = motions.enumerate();
-    scenes
-        .map(|(index, motion)| scene(index, motion, known))
-        .collect()
+    let scene = |(index, motion)| scene(index, motion, known);
+    motions.enumerate().map(scene).collect()
 }
 
 /// The identified rope, simulated on the motions of a run folder.
@@ -51,7 +49,6 @@ pub fn simulated_rope(run: &Path) -> anyhow::Result<Vec<RopeMotion>> {
     Ok(scenes(&known)?.into_iter().map(motion).collect())
 }
 
-/// Reads a run.
 pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData> {
     ensure!(
         run.is_dir(),

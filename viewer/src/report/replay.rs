@@ -12,7 +12,6 @@ use run_log::Cycles;
 use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::{MonotonicNs, Plan, RopeParams};
 
-/// Frames per second.
 const RATE_HZ: f64 = 60.0;
 /// Shown before a motion (s).
 const BEFORE_S: f64 = 0.2;
@@ -50,7 +49,6 @@ pub(crate) struct Known<'a> {
     pub cell: Cell,
     /// Its cycles and measured joints.
     pub cycles: &'a Cycles,
-    /// The identified rope.
     pub rope: Option<&'a RopeParams>,
     /// The plan of the throw.
     pub plan: Option<&'a Plan>,
@@ -81,11 +79,7 @@ pub(crate) fn scene(
     let until_s = MonotonicNs(last.deadline_ns).since_s(begin).min(LONGEST_S) + AFTER_S;
     let (times_s, q, is_measured) = moved(motion, begin, until_s, known.cycles);
     let arm = MeasuredArm::new(&times_s, &q, known.cell.pole).context("the joints of a motion")?;
-    let frames = FrameTimes {
-        first_s: 0.0,
-        period_s: 1.0 / RATE_HZ,
-        count: frame_count(BEFORE_S + until_s),
-    };
+    let frames = frames(BEFORE_S + until_s);
     // The simulator's clock begins with the first frame.
     let shifted: Vec<f64> = times_s.iter().map(|t| t + BEFORE_S).collect();
     let on_film =
@@ -118,8 +112,12 @@ pub(crate) fn scene(
     })
 }
 
-fn frame_count(span_s: f64) -> usize {
-    (span_s * RATE_HZ).floor() as usize + 1
+fn frames(span_s: f64) -> FrameTimes {
+    FrameTimes {
+        first_s: 0.0,
+        period_s: 1.0 / RATE_HZ,
+        count: (span_s * RATE_HZ).floor() as usize + 1,
+    }
 }
 
 /// Joints on the motion's clock: measured, or as commanded where nothing was
@@ -187,13 +185,8 @@ fn simulate(
 
 /// The tip's path with the plan's own rope on the planned motion.
 fn planned_tip(plan: &Plan, pole: Pole, until_s: f64) -> anyhow::Result<Vec<i32>> {
-    let frames = FrameTimes {
-        first_s: 0.0,
-        period_s: 1.0 / RATE_HZ,
-        count: frame_count(until_s),
-    };
     let arm = PlannedArm::new(plan.trajectory, pole);
-    let rope = simulate(&plan.rope, &arm, frames, STEP_S.0)?;
+    let rope = simulate(&plan.rope, &arm, frames(until_s), STEP_S.0)?;
     Ok(rope
         .iter()
         .flat_map(|nodes| nodes[nodes.len().saturating_sub(3)..].to_vec())

@@ -86,11 +86,10 @@ pub fn reach_measured(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
     };
     let places: Vec<PathBuf> = config::arm_response_files().or_input()?.collect();
     let here = || {
-        let mut there = places
-            .iter()
-            .filter(|file| file.try_exists().unwrap_or(true));
+        let mut places = places.iter();
+        let there = places.find(|file| file.try_exists().unwrap_or(true));
         let may = !address.simulated && address.service.is_none();
-        there.next().cloned().filter(|_| may)
+        there.cloned().filter(|_| may)
     };
     let Some(path) = named.clone().or_else(here) else {
         if address.simulated {

@@ -47,10 +47,8 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     stage.done(&format!("{pairs} without and {pairs} with the recorder"));
     let rows = rows(&cycles);
     let missed = |cycles: &Vec<CycleRecord>| cycles.iter().map(|c| c.missed).sum::<u32>();
-    let (counts, missed) = (
-        cycles.each_ref().map(Vec::len),
-        cycles.each_ref().map(missed),
-    );
+    let counts = cycles.each_ref().map(Vec::len);
+    let missed = cycles.each_ref().map(missed);
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let machine = Machine::here();
     println!("{machine}; load {}", load.trim());

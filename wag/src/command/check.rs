@@ -15,9 +15,8 @@ fn kind_name(kind: LimitKind) -> &'static str {
     match kind {
         LimitKind::PositionMin => "position, lower",
         LimitKind::PositionMax => "position, upper",
-        LimitKind::Velocity => "speed",
+        LimitKind::Velocity | LimitKind::TcpSpeed => "speed",
         LimitKind::Acceleration => "acceleration",
-        LimitKind::TcpSpeed => "speed",
     }
 }
 
@@ -93,10 +92,8 @@ pub fn run(args: &CheckArgs) -> Outcome<Option<Value>> {
     let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
     let cell = config::cell_for(&plan).or_input()?;
     let margins = limits.margins(&plan.trajectory);
-    let broken: Vec<&Margin> = margins
-        .iter()
-        .filter(|m| m.left.is_nan() || m.left < 0.0)
-        .collect();
+    let is_broken = |m: &&Margin| m.left.is_nan() || m.left < 0.0;
+    let broken = margins.iter().filter(is_broken).count();
     let judged = arm_margins(&plan.trajectory, &limits, &arm);
     println!("{}\n\n{}", margin_table(&margins), rule_table(&judged));
     let refuse = |what: String| {
@@ -117,8 +114,7 @@ pub fn run(args: &CheckArgs) -> Outcome<Option<Value>> {
     );
     if let Some(worst) = limits.worst_violation(&plan.trajectory) {
         return refuse(format!(
-            "breaks {} of {} limits; the worst is {}; {arm_says}",
-            broken.len(),
+            "breaks {broken} of {} limits; the worst is {}; {arm_says}",
             margins.len(),
             worst.describe()
         ));

@@ -13,7 +13,7 @@ use anyhow::{Context, anyhow, bail};
 use arm_model::{JointTrajectory, Limits};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use camera_ingest::process::CameraConfig;
-use cli_output::{Failure, OrInput, Outcome, Stage, output, watch_interrupts};
+use cli_output::{OrInput, Outcome, Stage, output, watch_interrupts};
 use planner::PlannerConfig;
 use planner::plan::{check_reach, clear_of_arm};
 use planner::service::{PlannerRequest, PlannerRpc};
@@ -83,17 +83,16 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
     let result = throw_once(&folder, &mut session, &mut record, &rig, accept);
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
-    let keypoints_kept = session.received.keep_keypoints(folder.path());
+    let keypoints_kept = session.received.keep_keypoints(&folder.path);
     record.error = result.as_ref().err().map(|e| format!("{e:#}"));
     let summary_kept = files::write_json(&folder.file(files::SUMMARY), &record);
     let recorded = session.finish_run_file();
-    explain_stop(folder.path());
-    result
-        .with_context(|| format!("run `{}`", folder.path().display()))
-        .map_err(Failure::failed)?;
+    explain_stop(&folder.path);
+    let result = result.with_context(|| format!("run `{}`", folder.path.display()));
+    result.or_failed()?;
     keypoints_kept.or_failed()?;
     show(&record);
-    keep_report(folder.path());
+    keep_report(&folder.path);
     recorded.or_failed()?;
     summary_kept.or_failed()?;
     Ok(Some(serde_json::to_value(&record).or_failed()?))
@@ -163,7 +162,7 @@ impl<'a> Demo<'a> {
         // The calibration lies in the run folder as a lab's would.
         let calibration = rig_config.camera.stereo_camera();
         let (conf, mode) = (Path::new("camera.conf"), VideoMode::Vga);
-        write_factory_conf(&folder.path().join(conf), &calibration, mode)?;
+        write_factory_conf(&folder.path.join(conf), &calibration, mode)?;
         write_camera_toml(&folder.file("camera.toml"), &calibration, mode, conf)?;
         let target_m = Some(record.target_m);
         pipeline::start_recorder(session, folder, &limits, Some(&calibration), target_m)?;

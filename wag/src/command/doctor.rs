@@ -28,13 +28,9 @@ pub fn run(address: Option<IpAddr>, ports: &ArmPorts) -> Outcome<Option<Value>> 
         findings.push(response_finding(ip, is_real)?);
         if answers {
             let config: ControllerConfig = config::here(None).or_input()?;
-            let tool_m = limits.tcp_offset_m;
+            let (wanted, tool_m) = (&config.arm_settings, limits.tcp_offset_m);
             let at = |port| SocketAddr::new(ip, port);
-            findings.push(settings(
-                at(ports.status_port),
-                &config.arm_settings,
-                tool_m,
-            ));
+            findings.push(settings(at(ports.status_port), wanted, tool_m));
             findings.push(inputs(at(ports.command_port), config.enabling_input));
         }
     }
@@ -61,17 +57,9 @@ fn response_finding(ip: IpAddr, is_real: bool) -> Outcome<Finding> {
         "measure it with `wag latency --arm {ip} --response FILE`, FILE being arm-response.toml in the folder of configurations"
     );
     let Some(path) = places.find(|file| file.try_exists().unwrap_or(true)) else {
-        let verdict = if is_real {
-            Verdict::Fail
-        } else {
-            Verdict::Pass
-        };
-        return Ok(Finding::new(
-            name,
-            verdict,
-            "not measured".to_owned(),
-            &remedy,
-        ));
+        let verdict = Verdict::fail_unless(!is_real);
+        let found = "not measured".to_owned();
+        return Ok(Finding::new(name, verdict, found, &remedy));
     };
     let (verdict, found) = match files::read_arm_response(&path) {
         Ok(response) => {

@@ -42,11 +42,8 @@ pub fn tell(
     let address = arm
         .address
         .map_or_else(|| "the arm named with --arm".to_owned(), |a| a.to_string());
-    let start: Vec<String> = trajectory
-        .start()
-        .iter()
-        .map(|q| format!("{q:.3}"))
-        .collect();
+    let start = trajectory.start();
+    let start: Vec<String> = start.iter().map(|q| format!("{q:.3}")).collect();
     println!(
         "dry run: nothing is connected, nothing moves. Without --dry-run wag would\n  \
              1. ask whether the area is clear, unless --yes says so or the arm is simulated\n  \

@@ -5,11 +5,6 @@ use camera_ingest::live::{LiveCamera, LiveError, LiveSettings, record};
 use cli_output::{Failure, OrInput, Outcome, Stage, interrupted, watch_interrupts};
 use serde_json::{Value, json};
 
-/// A camera that cannot be had as asked is a wrong input; one that ends is a failure.
-fn failure(error: LiveError) -> Failure {
-    Failure::of(matches!(error, LiveError::Unfit(_)), error)
-}
-
 pub fn run(args: &FilmArgs) -> Outcome<Option<Value>> {
     watch_interrupts().or_failed()?;
     let settings = LiveSettings {
@@ -20,7 +15,9 @@ pub fn run(args: &FilmArgs) -> Outcome<Option<Value>> {
         exposure_raw: args.exposure_raw,
         sensor_gain_raw: args.sensor_gain_raw,
     };
-    let mut camera = LiveCamera::open(settings).map_err(failure)?;
+    // One that cannot be had as asked is a wrong input; one that ends is a failure.
+    let mut camera = LiveCamera::open(settings)
+        .map_err(|error| Failure::of(matches!(error, LiveError::Unfit(_)), error))?;
     let stage = Stage::begin("film");
     let reported = |frames: u64| {
         if frames.is_multiple_of(30) {

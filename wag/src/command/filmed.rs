@@ -68,13 +68,11 @@ impl ClampMotion {
     }
 }
 
-/// A film of a rope.
 #[derive(Debug)]
 pub struct Filmed {
     source: AnySource,
     /// Where it is from.
     pub path: PathBuf,
-    /// What filmed it.
     pub camera: StereoCamera,
     pub motion: ClampMotion,
     /// What is missing or damaged.
@@ -130,38 +128,28 @@ impl Filmed {
     }
 
     fn of_run(path: &Path, rate_hz: Option<f64>, scene: &SceneArgs) -> anyhow::Result<Self> {
+        let name = path.display();
         ensure!(
             rate_hz.is_none(),
-            "--fps is for recordings without times, but the run's file `{}` has them",
-            path.display()
+            "--fps is for recordings without times, but the run's file `{name}` has them"
         );
         let run = Run::open(path)?;
         let part = run.film()?.part(scene.part.unwrap_or(1))?;
         let camera = match (&scene.camera, &part.camera) {
             (Some(file), _) => load_camera(file)?,
             (None, Some(Ok(camera))) => camera.clone(),
-            (None, Some(Err(reason))) => {
-                bail!(
-                    "the camera in the run's file `{}` is none: {reason}; name another with --camera",
-                    path.display()
-                );
-            }
+            (None, Some(Err(reason))) => bail!(
+                "the camera in the run's file `{name}` is none: {reason}; name another with --camera"
+            ),
             (None, None) => {
-                bail!(
-                    "the run's file `{}` does not tell its camera: name it with --camera",
-                    path.display()
-                );
+                bail!("the run's file `{name}` does not tell its camera: name it with --camera")
             }
         };
         let motion = if scene.motion.is_given() {
             ClampMotion::read(scene)?
         } else {
-            ClampMotion::new(
-                path,
-                Some(part.joints.clone()),
-                config::cell_of(&run)?,
-                scene,
-            )
+            let joints = Some(part.joints.clone());
+            ClampMotion::new(path, joints, config::cell_of(&run)?, scene)
         };
         Ok(Self {
             warnings: part.warnings.clone(),

@@ -12,7 +12,7 @@ use anyhow::Context;
 use cli_output::{Failure, OrInput, Outcome, Stage, table};
 use comfy_table::Table;
 use planner::PlannerConfig;
-use planner::identify::{IdentifyError, IdentifyOptions, Method};
+use planner::identify::{IdentifyOptions, Method};
 use planner::observation::{Appearance, Observation, ObservedPoints};
 use rope_sim::AttachMotion;
 use run_log::files;
@@ -99,10 +99,6 @@ fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     })
 }
 
-fn classify(error: IdentifyError) -> Failure {
-    Failure::of(error.is_input(), error)
-}
-
 fn parameter_table(estimate: &RopeEstimate) -> Table {
     let values = RANGES
         .iter()
@@ -182,7 +178,7 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
     let estimate = planner::identify(&observation, &options, net.as_ref(), &mut |p| {
         stage.go_on(&p)
     })
-    .map_err(classify)?;
+    .map_err(|error| Failure::of(error.is_input(), error))?;
     let seconds = stage.done(&format!(
         "residual {:.2} px, {} simulations",
         estimate.residual_px, estimate.simulations

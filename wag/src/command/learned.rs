@@ -17,10 +17,7 @@ pub struct Learned {
 
 /// Bad input where it is the file's fault.
 fn refused(error: ModelError) -> Failure {
-    match error {
-        ModelError::Runtime { .. } => Failure::failed(error),
-        other => Failure::input(other),
-    }
+    Failure::of(!matches!(error, ModelError::Runtime { .. }), error)
 }
 
 impl Learned {

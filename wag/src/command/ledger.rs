@@ -27,19 +27,17 @@ fn list(args: &LedgerArgs) -> Outcome<Option<Value>> {
         places.push(PathBuf::from(RUNS));
     }
     let mut entries = ledger::find(&places).or_input()?;
+    let command = args.command.as_deref();
     let plan = args.plan.as_ref().map(|hash| hash.to_lowercase());
+    let of_plan = |e: &Entry, hash: &str| {
+        let found = e.plan_sha256.as_ref();
+        found.is_some_and(|found| found.starts_with(hash))
+    };
     entries.retain(|e| {
         args.result.is_none_or(|result| e.result == result)
-            && args
-                .command
-                .as_deref()
-                .is_none_or(|c| e.command() == Some(c))
+            && command.is_none_or(|c| e.command() == Some(c))
             && args.seed.is_none_or(|seed| e.seed == Some(seed))
-            && plan.as_deref().is_none_or(|hash| {
-                e.plan_sha256
-                    .as_ref()
-                    .is_some_and(|found| found.starts_with(hash))
-            })
+            && plan.as_deref().is_none_or(|hash| of_plan(e, hash))
     });
     if let Some(path) = &args.csv {
         let text = ledger::csv(&entries).or_failed()?;

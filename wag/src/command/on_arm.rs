@@ -53,7 +53,7 @@ pub fn on_arm(
         let link = bring_up(session, &folder, &address, limits, start, &mut found)?;
         let mut value = work(session, &link)?;
         value["ok"] = true.into();
-        value["run"] = json!(folder.path());
+        value["run"] = json!(folder.path);
         value["warnings"] = json!(found.warnings);
         Ok(value)
     };
@@ -61,7 +61,7 @@ pub fn on_arm(
     session.end(result.is_ok());
     let cycles = std::mem::take(&mut session.received.cycles);
     let epoch_ns = cycles.cycles.first().map_or(0, |c| c.deadline_ns);
-    let result = result.and_then(|value| conclude(folder.path(), cycles, value));
+    let result = result.and_then(|value| conclude(folder.path.as_path(), cycles, value));
     let mut summary = match &result {
         Ok(value) => value.clone(),
         Err(e) => json!({ "ok": false, "error": format!("{e:#}") }),
@@ -77,11 +77,11 @@ pub fn on_arm(
     summary["bring_up"] = found.steps.iter().map(step).collect();
     let kept = files::write_json(&folder.file(files::SUMMARY), &summary);
     let recorded = session.finish_run_file();
-    explain_stop(folder.path());
+    explain_stop(&folder.path);
     let value = result.or_failed()?;
     recorded.or_failed()?;
     kept.or_failed()?;
-    Ok((folder.path().to_owned(), value))
+    Ok((folder.path.clone(), value))
 }
 
 /// Starts everything and moves to the start pose; what was `found` on the way.

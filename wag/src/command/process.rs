@@ -85,18 +85,14 @@ fn give_way() {
 
 pub fn run(args: &ProcessArgs) -> Outcome {
     watch_interrupts().or_failed()?;
-    let end_within = match args.name {
-        ProcessName::RtController | ProcessName::Guardian => BRAKE_WITHIN,
-        ProcessName::Recorder => FINISH_WITHIN,
+    let (end_within, outlives) = match args.name {
+        ProcessName::RtController | ProcessName::Guardian => (BRAKE_WITHIN, Duration::ZERO),
+        ProcessName::Recorder => (FINISH_WITHIN, OUTLIVES),
         ProcessName::Rig
         | ProcessName::Camera
         | ProcessName::CameraIngest
         | ProcessName::Preview
-        | ProcessName::Planner => END_WITHIN,
-    };
-    let outlives = match args.name {
-        ProcessName::Recorder => OUTLIVES,
-        _ => Duration::ZERO,
+        | ProcessName::Planner => (END_WITHIN, Duration::ZERO),
     };
     watch_parent(args.parent, outlives, end_within).or_failed()?;
     let stop = interrupted();

@@ -56,11 +56,11 @@ pub fn run(args: &RecordArgs) -> Outcome<Option<Value>> {
     Bus::join(&domain).or_input()?;
     watch_interrupts().or_failed()?;
     let folder = RunFolder::create(args.out.as_deref(), "record")?;
-    let config = RecorderConfig::of_run(&domain, folder.path(), &limits, cell);
+    let config = RecorderConfig::of_run(&domain, &folder.path, &limits, cell);
     let recorder = RunFileThread::start(config).or_failed()?;
     println!(
         "recording the controller of domain `{domain}` in {}; Ctrl-C ends it",
-        folder.path().display()
+        folder.path.display()
     );
     let began = Instant::now();
     let over = || {
@@ -81,9 +81,9 @@ pub fn run(args: &RecordArgs) -> Outcome<Option<Value>> {
         ));
     }
     let cell_kept = folder.config("cell", &cell);
-    let explanation = Run::open(folder.path()).or_failed()?.keep_cause();
+    let explanation = Run::open(&folder.path).or_failed()?.keep_cause();
     let mut summary = json!({
-        "ok": recorded.is_ok(), "command": "record", "run": folder.path(), "domain": domain,
+        "ok": recorded.is_ok(), "command": "record", "run": folder.path, "domain": domain,
         "recording": counts, "explanation": explanation,
     });
     if let Err(reason) = &recorded {
@@ -101,7 +101,7 @@ pub fn run(args: &RecordArgs) -> Outcome<Option<Value>> {
         println!(
             "{:.1} MB; read it with `wag explain {}`, or open its {}",
             counts.bytes as f64 / 1e6,
-            folder.path().display(),
+            folder.path.display(),
             files::RUN
         );
     }

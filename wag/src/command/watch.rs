@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use shared_types::ipc::IpcError;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use viewer::live::{PreviewView, Wanted, Watcher, domain_of_run};
+use viewer::live::{Wanted, Watcher, domain_of_run};
 
 /// How much sooner everything else gets a processor than this program.
 const NICE: i32 = 10;
@@ -27,7 +27,7 @@ struct Preview {
     process: Supervisor,
     /// Its configuration and log.
     folder: tempfile::TempDir,
-    view: Option<PreviewView>,
+    view: Option<PreviewConfig>,
     /// When it was started last.
     begun: Option<Instant>,
     runs: bool,
@@ -64,17 +64,16 @@ impl Preview {
         }
         if let Some(view) = self.view.clone() {
             self.begun = Some(Instant::now());
-            match self.start(view) {
+            match self.start(&view) {
                 Ok(()) => self.runs = true,
                 Err(reason) => tracing::warn!("there is no preview: {reason:#}"),
             }
         }
     }
 
-    fn start(&mut self, view: PreviewView) -> anyhow::Result<()> {
-        let config = PreviewConfig::new(&view.domain, view.camera, view.cell);
+    fn start(&mut self, view: &PreviewConfig) -> anyhow::Result<()> {
         let path = self.folder.path().join("preview.toml");
-        let text = toml::to_string(&config).context("configuration of preview")?;
+        let text = toml::to_string(view).context("configuration of preview")?;
         files::write_atomic(&path, text.as_bytes())?;
         let spec = ProcessSpec {
             name: "preview",

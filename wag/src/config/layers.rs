@@ -14,19 +14,13 @@ const SITE: &str = "/etc/wag";
 pub const RIG_FOLDER: &str = "WAG_CONFIG";
 
 /// Where files of a site and of a rig are looked for.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Folders {
     pub site: Option<PathBuf>,
     pub rig: Option<PathBuf>,
 }
 
 impl Folders {
-    /// No folders: what is built in.
-    pub const NONE: Self = Self {
-        site: None,
-        rig: None,
-    };
-
     /// Those of this machine and user: `/etc/wag`, and the folder named by `WAG_CONFIG`,
     /// else `wag` in the user's folder of configurations.
     pub fn here() -> anyhow::Result<Self> {
@@ -267,9 +261,9 @@ mod tests {
     #[test]
     fn nothing_but_what_is_built_in_are_the_defaults() {
         for kind in Kind::value_variants() {
-            Layers::read(*kind, &Folders::NONE, None).unwrap();
+            Layers::read(*kind, &Folders::default(), None).unwrap();
         }
-        let planner = Layers::read(Kind::Planner, &Folders::NONE, None).unwrap();
+        let planner = Layers::read(Kind::Planner, &Folders::default(), None).unwrap();
         let config: PlannerConfig = planner.get().unwrap();
         assert_eq!(config, PlannerConfig::default());
     }

@@ -98,5 +98,5 @@ pub fn check_here() -> anyhow::Result<()> {
 /// What is built in alone, whatever this machine's folders say: for results that must be
 /// the same everywhere.
 pub fn built_in<T: Configured>() -> anyhow::Result<T> {
-    Layers::read(T::KIND, &Folders::NONE, None)?.get()
+    Layers::read(T::KIND, &Folders::default(), None)?.get()
 }

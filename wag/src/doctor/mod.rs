@@ -32,7 +32,7 @@ impl Verdict {
         if good { Self::Pass } else { Self::Warn }
     }
 
-    const fn fail_unless(good: bool) -> Self {
+    pub const fn fail_unless(good: bool) -> Self {
         if good { Self::Pass } else { Self::Fail }
     }
 }

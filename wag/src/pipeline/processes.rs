@@ -43,7 +43,7 @@ pub fn start_recorder(
     let config = RecorderConfig {
         target_m,
         camera: camera.cloned(),
-        ..RecorderConfig::of_run(&folder.domain, folder.path(), limits, cell)
+        ..RecorderConfig::of_run(&folder.domain, &folder.path, limits, cell)
     };
     let spec = ProcessSpec {
         name: "recorder",
@@ -96,7 +96,6 @@ pub fn start_rig(
     }
 }
 
-/// Where an arm listens.
 #[derive(Debug, Clone)]
 pub struct ArmAddress {
     pub ip: IpAddr,
@@ -105,7 +104,6 @@ pub struct ArmAddress {
     pub joints: u16,
     /// Ports with its status (5 Hz), in the order in which they are tried.
     pub status: [u16; 2],
-    /// Whether it is the simulated arm.
     pub simulated: bool,
     /// How it follows its setpoints, where that is known, and the file that tells it.
     pub arm_response: Option<(PathBuf, ArmResponse)>,

@@ -8,7 +8,7 @@ use std::time::SystemTime;
 
 #[derive(Debug)]
 pub struct RunFolder {
-    path: PathBuf,
+    pub path: PathBuf,
     /// Shared-memory domain of this run's processes.
     pub domain: String,
 }
@@ -53,10 +53,6 @@ impl RunFolder {
             ));
         }
         Ok(())
-    }
-
-    pub fn path(&self) -> &Path {
-        &self.path
     }
 
     pub fn file(&self, name: &str) -> PathBuf {

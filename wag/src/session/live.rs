@@ -32,7 +32,6 @@ pub struct Session {
     supervisor: Supervisor,
     /// What stages work with.
     pub received: Received,
-    /// What the operator has confirmed so far.
     pub confirmed: Vec<Confirmation>,
     run_file: Option<RunFile>,
     bus: Bus,

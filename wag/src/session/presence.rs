@@ -98,7 +98,6 @@ impl Typed {
     }
 }
 
-/// The operator.
 #[derive(Debug)]
 pub struct Presence {
     lines: Receiver<Line>,
@@ -154,7 +153,6 @@ impl Presence {
         self.typed.switch
     }
 
-    /// Whether the switch has been let go.
     pub fn is_let_go(&mut self) -> bool {
         let now = self.look();
         self.typed.is_let_go(now)

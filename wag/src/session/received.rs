@@ -19,7 +19,6 @@ pub struct Received {
 }
 
 impl Received {
-    /// Subscribes to everything that stages work with.
     pub fn open(bus: &Bus) -> Result<Self, IpcError> {
         Ok(Self {
             joint_subscriber: bus.joint_subscriber()?,

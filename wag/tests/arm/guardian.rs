@@ -1,7 +1,7 @@
 //! The controller is killed in the middle of a motion: the guardian stops the
 //! arm on its own connection, before it comes to rest by silence alone.
 
-use super::support::{Rig, alone, process_of, send, until};
+use super::support::{Rig, alone, ended, has, process_of, send, until};
 use rt_controller::session::ArmSession;
 use rt_controller::xarm::ArmState;
 use rustix::process::Signal;
@@ -34,9 +34,7 @@ fn a_controller_killed_in_motion_leaves_a_stopped_arm() {
         "state 4 read {:.1} ms after SIGKILL",
         killed.elapsed().as_secs_f64() * 1e3
     );
-    let said = wiggle.wait_with_output().unwrap();
-    assert_eq!(said.status.code(), Some(1));
+    ended(wiggle, 1);
     let log = std::fs::read_to_string(run.join("log/guardian.log")).unwrap();
-    assert!(log.contains("lost while the arm moved"), "{log}");
-    assert!(log.contains("seen stopped"), "{log}");
+    has(&log, &["lost while the arm moved", "seen stopped"]);
 }

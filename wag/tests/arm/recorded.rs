@@ -3,8 +3,8 @@
 //! no motion.
 
 use super::support::{
-    Rig, alone, command, json, process_of, refused_in, said, send, shared_memory_of, until,
-    until_recorded, wag,
+    Rig, alone, command, ended, has, json, process_of, refused_in, said, send, shared_memory_of,
+    until, until_recorded, wag,
 };
 use mcap::{MessageStream, Summary};
 use rustix::process::Signal;
@@ -56,9 +56,7 @@ fn replays_exactly(run: &str) -> Value {
 fn page_has(run: &str, words: &[&str]) {
     let page = String::from_utf8(wag(&format!("explain {run}")).stdout).unwrap();
     println!("{page}");
-    for word in words {
-        assert!(page.contains(word), "`{word}` is not in\n{page}");
-    }
+    has(&page, words);
 }
 
 #[test]
@@ -69,8 +67,7 @@ fn a_whole_run_lies_in_one_file_that_replays_to_the_bit_and_others_may_join() {
     let path = folder.path().join("run");
     let wiggle = rig.wiggle(&path);
     others_join(folder.path(), wiggle.id());
-    let output = wiggle.wait_with_output().unwrap();
-    assert!(output.status.success(), "{}", said(&output));
+    ended(wiggle, 0);
     let named = folder.path().join("named").display().to_string();
     let found = replays_exactly(&named);
     assert!(found["first_cycle"].as_u64().unwrap() > 1, "{found}");
@@ -113,21 +110,17 @@ fn others_join(folder: &Path, pid: u32) {
     let out = late.display();
     let line = format!("record --domain {nobody} --seconds 0.1 --out {out}");
     let lost = refused_in(Path::new("."), 1, &line);
-    assert!(lost.contains("no controller runs"), "{lost}");
-    assert!(lost.contains(&domain), "{lost}");
+    has(&lost, &["no controller runs", &domain]);
     assert!(!late.exists(), "nothing recorded, nothing left");
     assert_eq!(shared_memory_of(&nobody), Vec::<String>::new());
 
-    let reported = json(&format!(
-        "record {} --seconds 1.5 --out {out}",
-        run.display()
-    ));
+    let line = format!("record {} --seconds 1.5 --out {out}", run.display());
+    let reported = json(&line);
     assert_eq!(reported["domain"], domain.as_str());
     assert!(reported["recording"]["chunks"].as_u64().unwrap() > 0);
     let named = folder.join("named").display().to_string();
-    json(&format!(
-        "record --domain {domain} --seconds 2 --out {named}"
-    ));
+    let line = format!("record --domain {domain} --seconds 2 --out {named}");
+    json(&line);
 }
 
 /// It opens with other readers, and its tables are those of the recorded cycles.
@@ -147,11 +140,8 @@ fn its_file_is_whole(run: &Path) {
     let exact = replayed["cycles"].as_u64().unwrap();
     assert!(exact > 1000, "{replayed}");
     // No folder: a file, which is left as it is.
-    let said = refused_in(
-        Path::new("."),
-        2,
-        &format!("export csv {name} --out {}", file.display()),
-    );
+    let export = format!("export csv {name} --out {}", file.display());
+    let said = refused_in(Path::new("."), 2, &export);
     assert!(said.contains("run.mcap"), "{said}");
     assert_eq!(fs::read(&file).unwrap(), bytes);
     let tables = json(&format!("export csv {name}"));
@@ -187,10 +177,9 @@ fn ledger_knows(runs: &Path, run: &Path, rig: Rig) {
     let again = json(&format!("ledger rerun {run}"));
     let words: Vec<String> = serde_json::from_value(again["arguments"].clone()).unwrap();
     assert_eq!(words[..2], ["wiggle", "--arm"]);
-    assert!(
-        !words.contains(&"--out".to_owned()) && !words.contains(&run),
-        "{words:?}"
-    );
+    for word in ["--out", &run] {
+        assert!(!words.iter().any(|w| w == word), "{words:?}");
+    }
     let same = json(&format!("ledger compare {run} {run}"));
     assert_eq!(same["differences"], Value::Array(Vec::new()));
     let go = format!("ledger rerun {run} --go");
@@ -200,8 +189,7 @@ fn ledger_knows(runs: &Path, run: &Path, rig: Rig) {
         (made() == 1).then_some(())
     });
     send(again.id(), Signal::INT);
-    let output = again.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    ended(again, 1);
     drop(rig);
     // The arm is gone by now: it fails as it would by hand.
     let gone = refused_in(Path::new("."), 1, &go);
@@ -219,10 +207,8 @@ fn a_stopped_run_is_explained_and_replays_to_the_bit() {
     let rig = Rig::start(&format!("--faults {}", faults.display()));
     let path = folder.path().join("run");
     let run = path.display().to_string();
-    let output = rig.wiggle(&path).wait_with_output().unwrap();
-    let said = said(&output);
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("STOPPED: ArmError"), "{said}");
+    let said = ended(rig.wiggle(&path), 1);
+    has(&said, &["STOPPED: ArmError"]);
 
     let replayed = replays_exactly(&run);
     assert_eq!(replayed["first_cycle"], 1, "{replayed}");
@@ -233,10 +219,8 @@ fn a_stopped_run_is_explained_and_replays_to_the_bit() {
     assert_eq!(stops.len(), 1, "{found:#}");
     let stop = &stops[0];
     assert_eq!(stop["arm_error"], 31, "{stop:#}");
-    assert!(
-        stop["cycles_around"].as_array().unwrap().len() >= 8,
-        "{stop:#}"
-    );
+    let around = stop["cycles_around"].as_array().unwrap();
+    assert!(around.len() >= 8, "{stop:#}");
     let kept: Value = serde_json::from_slice(&fs::read(path.join("cause.json")).unwrap()).unwrap();
     assert_eq!(&kept, found);
     page_has(&run, &["what happened", "what to do", "until ms", "C31"]);
@@ -272,15 +256,9 @@ fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
     let recorder = process_of(&wiggle.id().to_string(), "recorder").unwrap();
     let killed_ns = UNIX_EPOCH.elapsed().unwrap().as_nanos();
     send(recorder, Signal::KILL);
-    let output = wiggle.wait_with_output().unwrap();
-    let said = said(&output);
-    assert_eq!(output.status.code(), Some(1), "{said}");
-    let reported = [
-        "the run continues",
-        "killed by signal 9",
-        "wag record recover",
-    ];
-    assert!(reported.iter().all(|words| said.contains(words)), "{said}");
+    let said = ended(wiggle, 1);
+    has(&said, &["the run continues", "killed by signal 9"]);
+    has(&said, &["wag record recover"]);
     let reported: Value =
         serde_json::from_slice(&fs::read(run.join("summary.json")).unwrap()).unwrap();
     assert_eq!(reported["ok"], true, "the motion was finished");

@@ -1,7 +1,7 @@
 //! `wag rig`: one in each domain, which leaves nothing; the vendor's own Python client
 //! against it, by the conformance check that lies beside the checkout.
 
-use super::support::{Rig, alone, said, shared, shared_memory_of, wag};
+use super::support::{Rig, alone, has, said, shared, shared_memory_of, wag};
 use rustix::process::Signal;
 use std::process::Command;
 
@@ -16,8 +16,7 @@ fn a_second_rig_in_a_domain_says_so_and_an_ended_one_leaves_nothing() {
     let refusal = said(&second);
     assert_eq!(second.status.code(), Some(1), "{refusal}");
     assert!(second.stdout.is_empty(), "it never listened");
-    assert!(refusal.contains(&domain), "{refusal}");
-    assert!(refusal.contains("in use by another rig"), "{refusal}");
+    has(&refusal, &[&domain, "in use by another rig"]);
     assert_eq!(first.process.end(Signal::INT), (Some(0), String::new()));
     assert_eq!(shared_memory_of(&domain), Vec::<String>::new());
 }

@@ -1,7 +1,7 @@
 //! A cell given in one file: everything that computes with the pole, the floor or the
 //! column follows it.
 
-use super::support::{are_refused_in, json_in, plan_json, wag_in};
+use super::support::{are_refused_in, has, json_in, plan_json, wag_in};
 use arm_model::joint::START_POSE;
 use arm_model::{Cell, JointTrajectory};
 use planner::collide::{ArmShape, tool_contacts};
@@ -104,10 +104,9 @@ fn the_renderer_draws_the_cell() {
 
 #[test]
 fn one_file_changes_what_the_commands_compute() {
-    let dir = tempfile::tempdir().unwrap();
-    let put = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
-    put("cell.toml", "[pole]\nlength_m = 0.30\n");
-    put("rope.toml", &toml::to_string(&random_rope(1)).unwrap());
+    let (dir, _) = folder_of_cells();
+    let rope = toml::to_string(&random_rope(1)).unwrap();
+    std::fs::write(dir.path().join("rope.toml"), rope).unwrap();
     let hold = JointTrajectory::hold(START_POSE, 0.2).unwrap();
     write_trajectory(&dir.path().join("joints.csv"), &hold, 0.01).unwrap();
     let tip_z = |more: &str| -> f64 {
@@ -123,10 +122,7 @@ fn one_file_changes_what_the_commands_compute() {
 
     let shown = wag_in(dir.path(), "config show cell cell.toml --origin");
     let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
-    assert!(
-        shown.contains("pole.length_m") && shown.contains("cell.toml"),
-        "{shown}"
-    );
+    has(&shown, &["pole.length_m", "cell.toml"]);
 }
 
 /// A folder with a cell of another pole, whole and as what differs, and one that is wrong.
@@ -192,12 +188,8 @@ fn a_plan_is_for_the_cell_that_it_was_made_for() {
     std::fs::write(dir.path().join("slow.toml"), slow).unwrap();
     let broken = wag_in(dir.path(), "check plan.json --limits slow.toml --json");
     let reported: Value = serde_json::from_slice(&broken.stdout).unwrap();
-    assert_eq!(
-        (&reported["ok"], broken.status.code()),
-        (&Value::Bool(false), Some(1))
-    );
-    assert!(
-        reported["margins"].as_array().unwrap().len() > 4,
-        "{reported}"
-    );
+    assert_eq!(reported["ok"], false);
+    assert_eq!(broken.status.code(), Some(1));
+    let margins = reported["margins"].as_array().unwrap();
+    assert!(margins.len() > 4, "{reported}");
 }

@@ -30,11 +30,7 @@ pub(crate) fn prepare() -> tempfile::TempDir {
     let put = |name: &str, text: &str| fs::write(dir.path().join(name), text).unwrap();
     put("rope.toml", ROPE);
     for (name, value, wrong) in [
-        (
-            "negative.toml",
-            "lead_mass_kg = 0.05",
-            "lead_mass_kg = -0.05",
-        ),
+        ("negative.toml", "mass_kg = 0.05", "mass_kg = -0.05"),
         ("zero.toml", "links = 23", "links = 0"),
         ("missing.toml", "length_m = 0.55\n", ""),
         ("nan.toml", "radius_m = 0.0055", "radius_m = nan"),

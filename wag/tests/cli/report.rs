@@ -2,7 +2,6 @@
 //! nothing of the run is markup, and which is the same every time.
 
 use super::support::{self, plan_json, record, refused_in, wag};
-use arm_model::joint::START_POSE;
 use arm_model::{Cell, JointTrajectory, Pole};
 use rt_controller::recording::RecordedCycle;
 use serde_json::{Value, json};
@@ -20,14 +19,7 @@ const ROPE: &str = "links = 22\nlength_m = 0.5\njoint_damping_nms_per_rad = 0.02
     [interval_90]\nlength_m = [4.9e-1, 5.1e-1]\n";
 
 fn throw() -> JointTrajectory {
-    let mut end = START_POSE;
-    end[5] -= 0.4;
-    end[1] -= 0.1;
-    JointTrajectory::new(
-        &[0.0, 0.5, 1.0],
-        &[START_POSE, (START_POSE + end) * 0.5, end],
-    )
-    .unwrap()
+    support::throw([0.1, 0.4])
 }
 
 /// The measured arm is behind its setpoints by this (s).
@@ -97,10 +89,8 @@ fn hostile_run(folder: &Path) -> PathBuf {
     let mut png = png::Encoder::new(fs::File::create(run.join("throw.png")).unwrap(), 64, 32);
     png.set_color(png::ColorType::Rgb);
     let pixels: Vec<u8> = (0..64 * 32 * 3_u32).map(|i| (i % 251) as u8).collect();
-    png.write_header()
-        .unwrap()
-        .write_image_data(&pixels)
-        .unwrap();
+    let mut png = png.write_header().unwrap();
+    png.write_image_data(&pixels).unwrap();
     run
 }
 
@@ -116,10 +106,8 @@ fn parts(html: &str) -> (Value, String) {
     let open = "<script type=\"application/json\" id=\"data\">";
     let (before, rest) = html.split_once(open).unwrap();
     let (data, after) = rest.split_once("</script>").unwrap();
-    (
-        serde_json::from_str(data).unwrap(),
-        format!("{before}{after}"),
-    )
+    let page = format!("{before}{after}");
+    (serde_json::from_str(data).unwrap(), page)
 }
 
 #[test]
@@ -137,12 +125,8 @@ fn a_report_tells_the_runs_numbers_and_does_no_harm() {
         assert!(!page.contains(word), "`{word}` stands in the page itself");
     }
     assert_eq!(html.matches("<script").count(), 2);
-    assert!(
-        !html
-            .replace("http://www.w3.org/2000/svg", "")
-            .contains("http:")
-    );
-    assert!(!html.contains("https:"));
+    let other = html.replace("http://www.w3.org/2000/svg", "");
+    assert!(!other.contains("http:") && !other.contains("https:"));
     assert_eq!(data["run"], HOSTILE);
     assert_eq!(data["summary"]["warnings"][0], CLOSE);
 
@@ -154,15 +138,11 @@ fn a_report_tells_the_runs_numbers_and_does_no_harm() {
     assert_eq!(length["interval_90"], json!([0.49, 0.51]));
     assert_eq!(length["truth"], 0.503);
     let wake = &data["latency"][0];
-    assert_eq!(
-        (&wake["cycles"], &wake["max_us"]),
-        (&json!(251), &json!(59.0))
-    );
+    assert_eq!(wake["cycles"], 251);
+    assert_eq!(wake["max_us"], 59.0);
     let missing = data["missing"].to_string();
-    assert!(
-        missing.contains("wiggle.png") && !missing.contains("run.mcap"),
-        "{missing}"
-    );
+    assert!(missing.contains("wiggle.png"), "{missing}");
+    assert!(!missing.contains("run.mcap"), "{missing}");
     let url = data["pictures"][0]["url"].as_str().unwrap();
     assert!(url.starts_with("data:image/jpeg;base64,"));
 
@@ -185,11 +165,8 @@ fn a_run_is_shown_in_its_own_cell_unless_another_is_named() {
     let mut cell = Cell::default();
     cell.pole.length_m = 0.30;
     fs::create_dir(run.join("config")).unwrap();
-    fs::write(
-        run.join("config/cell.toml"),
-        toml::to_string(&cell).unwrap(),
-    )
-    .unwrap();
+    let cell = toml::to_string(&cell).unwrap();
+    fs::write(run.join("config/cell.toml"), cell).unwrap();
     assert_eq!([pole_m(""), pole_m(&named)], [json!(0.30), json!(0.25)]);
 }
 
@@ -204,10 +181,7 @@ fn the_replay_is_the_measured_arm_with_the_rope_on_it() {
     let at = |frames: &Value, frame: usize, point: usize| -> [f64; 3] {
         [0, 1, 2].map(|axis| frames[frame][3 * point + axis].as_f64().unwrap() * 1e-4)
     };
-    let (from_s, period_s) = (
-        scene["from_s"].as_f64().unwrap(),
-        scene["period_s"].as_f64().unwrap(),
-    );
+    let [from_s, period_s] = ["from_s", "period_s"].map(|key| scene[key].as_f64().unwrap());
     let count = scene["arm"].as_array().unwrap().len();
     assert_eq!(count, scene["rope"].as_array().unwrap().len());
     for frame in [0, 30, count / 2, count - 30] {
@@ -216,15 +190,10 @@ fn the_replay_is_the_measured_arm_with_the_rope_on_it() {
         let (end, _) = Pole::default().attach_pose(&q);
         let shown = at(&scene["arm"], frame, 8);
         let clamp = at(&scene["rope"], frame, 0);
+        let told = format!("{frame}: {clamp:?} {shown:?} {end}");
         for axis in 0..3 {
-            assert!(
-                (shown[axis] - end[axis]).abs() < 1e-3,
-                "{frame}: {shown:?} {end}"
-            );
-            assert!(
-                (clamp[axis] - shown[axis]).abs() < 1e-3,
-                "{frame}: {clamp:?} {shown:?}"
-            );
+            assert!((shown[axis] - end[axis]).abs() < 1e-3, "{told}");
+            assert!((clamp[axis] - shown[axis]).abs() < 1e-3, "{told}");
         }
     }
     // The rope is as long as it was identified, and it moves.

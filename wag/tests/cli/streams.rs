@@ -1,7 +1,7 @@
 //! Where a command's words and results go: pipes that close, disks that are
 //! full, results to standard output, links and pipes in the place of files.
 
-use super::support::{command, json_in, said, wag_in};
+use super::support::{command, has, json_in, said, wag_in};
 use std::fs::{self, File};
 use std::os::unix::fs::FileTypeExt;
 use std::process::Command;
@@ -29,11 +29,8 @@ fn a_full_disk_behind_standard_output_is_one_clear_error() {
     let dir = tempfile::tempdir().unwrap();
     let full = File::options().write(true).open("/dev/full").unwrap();
     let mut command = command("wiggle --csv w.csv");
-    let output = command
-        .current_dir(dir.path())
-        .stdout(full)
-        .output()
-        .unwrap();
+    command.current_dir(dir.path()).stdout(full);
+    let output = command.output().unwrap();
     let said = said(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("standard output"), "{said}");
@@ -58,13 +55,8 @@ fn a_result_can_go_to_standard_output_and_stands_there_alone() {
 fn pipes_and_links_stay_what_they_are() {
     let dir = tempfile::tempdir().unwrap();
     let pipe = dir.path().join("pipe");
-    assert!(
-        Command::new("mkfifo")
-            .arg(&pipe)
-            .status()
-            .unwrap()
-            .success()
-    );
+    let made = Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
     let mut command = command("wiggle --csv pipe");
     let child = command.current_dir(dir.path()).spawn().unwrap();
     let text = fs::read_to_string(&pipe).unwrap();
@@ -108,8 +100,7 @@ fn a_dry_run_needs_no_arm_and_connects_to_nothing() {
     }
     let output = wag_in(dir.path(), "wiggle --dry-run");
     let page = String::from_utf8_lossy(&output.stdout).into_owned();
-    for words in ["nothing moves", "250 setpoints a second", "Tightest: "] {
-        assert!(page.contains(words), "`{words}` is not in\n{page}");
-    }
+    let words = ["nothing moves", "250 setpoints a second", "Tightest: "];
+    has(&page, &words);
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
 }

@@ -1,7 +1,7 @@
 //! `wag identify` on films of simulated ropes, from files to files: what it says of ropes
 //! inside the ranges and outside.
 
-use super::support::{calibrate, said, wag_in};
+use super::support::{calibrate, has, said, wag_in};
 use arm_model::Limits;
 use arm_model::Pole;
 use camera_ingest::calib::VideoMode;
@@ -64,10 +64,8 @@ fn identified(rope: &RopeParams, index: u64) -> (String, toml::Table) {
 fn a_rope_of_the_ranges_is_taken_for_one() {
     let rope = trial_rope(SEED, 0);
     let (said, file) = identified(&rope, 0);
-    assert!(
-        !said.contains("outside") && !said.contains("wide"),
-        "{said}"
-    );
+    assert!(!said.contains("outside"), "{said}");
+    assert!(!said.contains("wide"), "{said}");
     assert_eq!(file["fit"]["method"].as_str(), Some("hybrid-network"));
     assert_eq!(file["fit"]["out_of_distribution"].as_bool(), Some(false));
     let off_m = file["length_m"].as_float().unwrap() - rope.length_m;
@@ -85,17 +83,12 @@ fn ropes_outside_are_fitted_wide_and_it_is_said() {
     for kind in kinds {
         let rope = outside_rope(SEED, *kind);
         let (said, file) = identified(&rope, *kind);
-        assert!(said.contains("outside the known ranges"), "{kind}: {said}");
-        assert!(
-            said.contains("by a search without ranges"),
-            "{kind}: {said}"
-        );
-        assert_eq!(
-            file["fit"]["method"].as_str(),
-            Some("hybrid-wide"),
-            "{kind}"
-        );
-        assert_eq!(file["fit"]["out_of_distribution"].as_bool(), Some(true));
+        println!("{kind}: {said}");
+        has(&said, &["outside the known ranges"]);
+        has(&said, &["by a search without ranges"]);
+        let fit = &file["fit"];
+        assert_eq!(fit["method"].as_str(), Some("hybrid-wide"), "{kind}");
+        assert_eq!(fit["out_of_distribution"].as_bool(), Some(true));
         if *kind != 0 {
             // Ropes of the known link counts move as the model can.
             let off_m = file["length_m"].as_float().unwrap() - rope.length_m;

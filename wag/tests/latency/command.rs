@@ -6,6 +6,7 @@ use super::{Errors, report, secret_lags};
 use arm_model::{ArmResponse, JOINTS};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
 use std::path::Path;
 use xarm_sim::{ArmConfig, JointLag, SimulatedArm};
 
@@ -25,7 +26,11 @@ fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
                 "joint {joint}: {text}"
             );
             let error = Errors::of(found.lag()?, &secrets[joint - 1]);
-            assert!(error.is_plausible(), "joint {joint}: {error:?}\n{text}");
+            // Two cycles and a quarter: a shared machine's wake-ups blur the measurement itself.
+            assert!(
+                error.are_below(8e-3, 0.25),
+                "joint {joint}: {error:?}\n{text}"
+            );
             Some(error)
         })
         .collect();
@@ -62,17 +67,16 @@ fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
     assert!(reported["loop"]["cycles"].as_u64().unwrap() > 2000);
     for part in ["wake", "compute", "send", "reply"] {
         let part = &reported["loop"][part];
-        let binned: u64 = part["bins"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|b| b["count"].as_u64().unwrap())
-            .sum();
+        let bins = part["bins"].as_array().unwrap().iter();
+        let binned: u64 = bins.map(|b| b["count"].as_u64().unwrap()).sum();
         assert_eq!(part["count"].as_u64().unwrap(), binned);
     }
-    let high = reported["command_to_target"]["interval_s"][1]
-        .as_f64()
-        .unwrap();
+    let high_s = |found: &Value| {
+        found["command_to_target"]["interval_s"][1]
+            .as_f64()
+            .unwrap()
+    };
+    let high = high_s(&reported);
     assert!(high > 0.0 && high < 0.02, "{high}");
     let replayed = json_in(dir.path(), "replay run");
     assert_eq!(replayed["replay"]["differing_bytes"], 0);
@@ -83,9 +87,7 @@ fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
 
     let again = dir.path().join("again.toml");
     let reported = json_in(dir.path(), "latency --run run --response again.toml");
-    let again_high = reported["command_to_target"]["interval_s"][1]
-        .as_f64()
-        .unwrap();
+    let again_high = high_s(&reported);
     assert!((again_high - high).abs() < 1e-3, "{again_high} {high}");
     assert!(reported["excitation"].is_null());
     report("from the run", &check(&again, &secrets));

@@ -58,15 +58,9 @@ impl Errors {
         }
     }
 
-    /// Dead time within 2 ms, bandwidth and natural frequency within 10 %.
-    fn is_accepted(&self) -> bool {
-        self.dead_time_s < 2e-3 && self.bandwidth < 0.1 && self.natural_frequency < 0.1
-    }
-
-    /// Dead time within two cycles, the rest within a quarter: what a shared
-    /// machine, whose wake-ups blur the measurement itself, can be held to.
-    fn is_plausible(&self) -> bool {
-        self.dead_time_s < 8e-3 && self.bandwidth < 0.25 && self.natural_frequency < 0.25
+    /// Dead time within so much (s), bandwidth and natural frequency within a part.
+    fn are_below(&self, dead_time_s: f64, part: f64) -> bool {
+        self.dead_time_s < dead_time_s && self.bandwidth < part && self.natural_frequency < part
     }
 }
 

@@ -61,15 +61,13 @@ impl Chromium {
             path
         };
         let (orders, answers) = (pipe("orders"), pipe("answers"));
+        let profile = folder.path().join("profile");
         let process = Command::new("sh")
             .args(["-c", "exec \"$@\" 3<\"$ORDERS\" 4>\"$ANSWERS\"", "sh"])
             .arg(program)
             .args(OPTIONS.split_whitespace())
             .arg("--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1")
-            .arg(format!(
-                "--user-data-dir={}",
-                folder.path().join("profile").display()
-            ))
+            .arg(format!("--user-data-dir={}", profile.display()))
             .env("ORDERS", &orders)
             .env("ANSWERS", &answers)
             .stdin(Stdio::null())
@@ -102,22 +100,17 @@ impl Chromium {
 
     fn note(&mut self, event: &Value) {
         let params = &event["params"];
-        match event["method"].as_str() {
-            Some("Runtime.consoleAPICalled") if params["type"] == "error" => {
-                self.errors.push(params["args"].to_string());
-            }
-            Some("Runtime.exceptionThrown") => {
-                self.errors.push(params["exceptionDetails"].to_string())
-            }
-            Some("Log.entryAdded") if params["entry"]["level"] == "error" => {
-                self.errors.push(params["entry"].to_string());
-            }
+        let error = match event["method"].as_str() {
+            Some("Runtime.consoleAPICalled") if params["type"] == "error" => &params["args"],
+            Some("Runtime.exceptionThrown") => &params["exceptionDetails"],
+            Some("Log.entryAdded") if params["entry"]["level"] == "error" => &params["entry"],
             Some("Network.requestWillBeSent") => {
-                self.requests
-                    .push(params["request"]["url"].as_str().unwrap().to_owned());
+                let url = params["request"]["url"].as_str().unwrap();
+                return self.requests.push(url.to_owned());
             }
-            _ => {}
-        }
+            _ => return,
+        };
+        self.errors.push(error.to_string());
     }
 
     /// One method of the protocol; events that come meanwhile are noted.
@@ -141,7 +134,6 @@ impl Chromium {
         }
     }
 
-    /// Opens an address.
     pub(crate) fn open(&mut self, url: &str) {
         let went = self.call("Page.navigate", &json!({ "url": url }));
         assert!(went["errorText"].is_null(), "{url}: {went}");
@@ -153,10 +145,8 @@ impl Chromium {
         let params =
             json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let result = self.call("Runtime.evaluate", &params);
-        assert!(
-            result["exceptionDetails"].is_null(),
-            "{expression}: {result}"
-        );
+        let thrown = &result["exceptionDetails"];
+        assert!(thrown.is_null(), "{expression}: {result}");
         result["result"]["value"].clone()
     }
 

@@ -10,11 +10,9 @@ use std::time::{Duration, Instant};
 /// A watcher that ends when dropped.
 pub(crate) struct Watch {
     process: Running,
-    /// The page's address.
     pub(crate) url: String,
 }
 
-/// An answer.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) status: u16,
@@ -84,7 +82,6 @@ impl Watch {
         States(reader)
     }
 
-    /// Resident memory of the process (MB).
     pub(crate) fn resident_mb(&self) -> f64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap();
         let line = status.lines().find(|l| l.starts_with("VmRSS:")).unwrap();
@@ -101,14 +98,11 @@ impl Watch {
 impl Answer {
     /// What stands behind a name in its head.
     pub(crate) fn line(&self, name: &str) -> Option<&str> {
-        let lines = self.head.lines().filter_map(|l| l.split_once(": "));
-        lines
-            .into_iter()
-            .find_map(|(n, v)| (n == name).then_some(v))
+        let mut lines = self.head.lines().filter_map(|l| l.split_once(": "));
+        lines.find_map(|(n, v)| (n == name).then_some(v))
     }
 }
 
-/// A stream of states.
 pub(crate) struct States(BufReader<TcpStream>);
 
 impl States {
@@ -138,10 +132,8 @@ impl States {
 fn head(reader: &mut BufReader<TcpStream>) -> String {
     let mut head = String::new();
     while !head.ends_with("\r\n\r\n") {
-        assert!(
-            reader.read_line(&mut head).unwrap() > 0,
-            "no answer: {head}"
-        );
+        let read = reader.read_line(&mut head).unwrap();
+        assert!(read > 0, "no answer: {head}");
     }
     head
 }

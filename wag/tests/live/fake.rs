@@ -21,15 +21,14 @@ use std::time::{Duration, Instant};
 const CYCLE: Duration = Duration::from_millis(16);
 /// Size of a side-by-side frame (pixels).
 const SIZE: [u32; 2] = [256, 96];
+const FRAME_BYTES: usize = (SIZE[0] * SIZE[1] * 2) as usize;
 
 /// What others may see of it and do to it.
 #[derive(Debug, Default)]
 pub(crate) struct Wires {
     end: AtomicBool,
     operate: AtomicBool,
-    /// Stops asked for so far.
     pub(crate) stops: AtomicUsize,
-    /// Acknowledgements asked for so far.
     pub(crate) acknowledgements: AtomicUsize,
 }
 
@@ -82,9 +81,7 @@ fn run(domain: &str, wires: &Wires, ready: &std::sync::mpsc::Sender<()>) {
     let mut boards = ControllerBoards::create(&bus).unwrap();
     let cycles = bus.cycle_publisher().unwrap();
     let reports = bus.joint_publisher().unwrap();
-    let frames = bus
-        .frame_publisher((SIZE[0] * SIZE[1] * 2) as usize)
-        .unwrap();
+    let frames = bus.frame_publisher(FRAME_BYTES).unwrap();
     let server = RpcServer::<ControllerRpc>::open(&bus).unwrap();
     let mut operator: Option<OperatorEnd> = None;
     let mut fault = FaultCode::None;
@@ -134,7 +131,7 @@ fn run(domain: &str, wires: &Wires, ready: &std::sync::mpsc::Sender<()>) {
             width_px: SIZE[0],
             height_px: SIZE[1],
         };
-        let mut frame = frames.loan_slice((SIZE[0] * SIZE[1] * 2) as usize).unwrap();
+        let mut frame = frames.loan_slice(FRAME_BYTES).unwrap();
         *frame.user_header_mut() = header;
         frame.payload_mut().fill(128 + (cycle % 64) as u8);
         frame.send().unwrap();

@@ -231,10 +231,8 @@ fn preflight_and_arm_agree() {
         disagreements.len()
     );
     for code in [None, Some(22), Some(23), Some(24), Some(35), Some(60)] {
-        assert!(
-            codes.contains_key(&code),
-            "no plan with {code:?}: {codes:?}"
-        );
+        let is_met = codes.contains_key(&code);
+        assert!(is_met, "no plan with {code:?}: {codes:?}");
     }
     assert!(throws.iter().all(|t| t[0] > 20 && t[1] > 0), "{throws:?}");
 }

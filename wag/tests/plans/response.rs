@@ -62,12 +62,8 @@ const SWINGS_ON_S: f64 = 0.6;
 /// Tip and target at their closest on what the arm really did (m).
 fn thrown_m(rig: &VirtualRig, rope: &RopeParams, target_m: [f64; 3]) -> f64 {
     assert!(rig.log.causes.is_empty(), "{:?}", rig.log.causes);
-    let first = rig
-        .log
-        .records
-        .iter()
-        .find(|r| r.trajectory_s >= 0.0)
-        .unwrap();
+    let mut records = rig.log.records.iter();
+    let first = records.find(|r| r.trajectory_s >= 0.0).unwrap();
     let truth = rig.log.truth.iter().filter(|s| s.at.0 >= first.deadline_ns);
     let (times_s, q): (Vec<f64>, Vec<_>) = truth
         .map(|s| ((s.at.0 - first.deadline_ns) as f64 * 1e-9, s.state.q))

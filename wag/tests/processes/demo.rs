@@ -1,13 +1,14 @@
 //! Processes of a whole demo killed while the arm moves.
 
-use super::shell::{recorded, said};
-use crate::support::{alone, command, process_of, send, until};
+use super::shell::{last_flight, recorded};
+use crate::support::{alone, command, ended, has, process_of, send, until};
 use rustix::process::Signal;
 use shared_types::ipc::{Bus, ControllerMode, StateReader};
 use shared_types::{FaultCode, OperatingMode, Plan};
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::time::Duration;
+use viewer::live::domain_of_run;
 
 /// Longest wait for a stage of a demo.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -24,10 +25,8 @@ fn killed(child: Child, run: &Path, victim: &str, after_ms: u64) {
     std::thread::sleep(Duration::from_millis(after_ms));
     let victim_pid = process_of(&run.display().to_string(), victim).unwrap();
     send(victim_pid, Signal::KILL);
-    let (code, said) = said(child);
-    assert_eq!(code, Some(1), "{said}");
     let death = format!("{victim} process was killed by signal 9");
-    assert!(said.contains(&death), "{said}");
+    has(&ended(child, 1), &[&death]);
 }
 
 /// A demo that streams a trajectory of `operating_mode` right now, and its folder in `into`.
@@ -42,11 +41,9 @@ fn demo_in(into: &Path, operating_mode: OperatingMode) -> (Child, PathBuf) {
         if streams(&mut child, &run, operating_mode) {
             return (child, run);
         }
-        let (code, said) = said(child);
-        assert!(
-            TOO_BUSY.iter().any(|cause| said.contains(cause)),
-            "the demo ended before its {operating_mode:?}, exit code {code:?}: {said}"
-        );
+        let said = ended(child, 1);
+        let busy = TOO_BUSY.iter().any(|cause| said.contains(cause));
+        assert!(busy, "it ended before its {operating_mode:?}: {said}");
         eprintln!("demo {attempt}: {said}");
     }
     panic!("three demos found the machine too busy");
@@ -55,11 +52,11 @@ fn demo_in(into: &Path, operating_mode: OperatingMode) -> (Child, PathBuf) {
 /// Waits until the demo `child` streams a trajectory of `operating_mode`; `false` when it
 /// ended before.
 fn streams(child: &mut Child, run: &Path, operating_mode: OperatingMode) -> bool {
-    let config = run.join("config/rt-controller.toml");
     let mut state: Option<StateReader> = None;
     until("the motion", PATIENCE, || {
         if state.is_none() {
-            state = domain(&config)
+            state = domain_of_run(run)
+                .ok()
                 .and_then(|domain| Bus::join(&domain).ok())
                 .and_then(|bus| StateReader::open(&bus).ok());
         }
@@ -73,13 +70,6 @@ fn streams(child: &mut Child, run: &Path, operating_mode: OperatingMode) -> bool
     })
 }
 
-/// Where the processes of a demo meet, once its controller is configured.
-fn domain(config: &Path) -> Option<String> {
-    let text = std::fs::read_to_string(config).ok()?;
-    let table: toml::Table = toml::from_str(&text).ok()?;
-    Some(table.get("domain")?.as_str()?.to_owned())
-}
-
 #[test]
 fn fault_25_a_planner_killed_while_its_plan_runs_changes_nothing_but_the_report() {
     let folder = tempfile::tempdir().unwrap();
@@ -91,12 +81,7 @@ fn fault_25_a_planner_killed_while_its_plan_runs_changes_nothing_but_the_report(
     let plan = std::fs::read_to_string(run.join("plan.json")).unwrap();
     let plan: Plan = serde_json::from_str(&plan).unwrap();
     let (cycles, causes) = recorded(&run);
-    let throw: Vec<_> = cycles
-        .iter()
-        .rev()
-        .skip_while(|c| c.trajectory_s < 0.0)
-        .take_while(|c| c.trajectory_s >= 0.0)
-        .collect();
+    let throw: Vec<_> = last_flight(&cycles).collect();
     let last_s = throw[0].trajectory_s;
     assert!(last_s > plan.trajectory.duration_s() - 0.005, "{last_s} s");
     for cycle in throw.iter().filter(|c| c.sent != 0) {

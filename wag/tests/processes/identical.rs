@@ -1,8 +1,8 @@
 //! A plan is executed identically, byte for byte in the record, with planner and
 //! camera killed half-way.
 
-use super::shell::{arm, on_arm, recorded, said};
-use crate::support::{Running, alone, command, plan_json, until};
+use super::shell::{arm, last_flight, on_arm, recorded};
+use crate::support::{Running, alone, command, ended, plan_json, until};
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, JointVector};
 use camera_ingest::process::CameraConfig;
@@ -127,10 +127,8 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     let began = xarm_sim::clock::now();
     let state = until("the controller", PATIENCE, || StateReader::open(&bus).ok());
     let streams = until("the throw", PATIENCE, || {
-        assert!(
-            child.try_wait().unwrap().is_none(),
-            "ended before its throw"
-        );
+        let over = child.try_wait().unwrap();
+        assert_eq!(over, None, "ended before its throw");
         let now = state.get();
         let is_throw = now.operating_mode == OperatingMode::Throw as u8;
         (is_throw && now.mode == ControllerMode::Streaming as u8).then_some(now.cycle)
@@ -148,8 +146,7 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
         camera.kill();
         planner.kill();
     }
-    let (code, said) = said(child);
-    assert_eq!(code, Some(0), "{said}");
+    ended(child, 0);
     let dead = planner.0.try_wait().unwrap().is_some();
     assert_eq!(dead, murder, "killed while the arm moved, or never");
     drop((planned, filmed));
@@ -159,10 +156,8 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     assert_eq!(met, [(FaultCode::OperatorStop, 0)]);
     let guardian = std::fs::read_to_string(run.join("log/guardian.log")).unwrap();
     assert!(guardian.contains("guarding the controller"), "{guardian}");
-    let is_thrown = |r: &&CycleRecord| r.trajectory_s >= 0.0 && r.sent != 0;
-    let throw = cycles.iter().rev().skip_while(|r| r.trajectory_s < 0.0);
-    let throw = throw.take_while(|r| r.trajectory_s >= 0.0);
-    let mut flown: Vec<_> = throw.filter(is_thrown).copied().collect();
+    let sent = last_flight(&cycles).filter(|r| r.sent != 0);
+    let mut flown: Vec<_> = sent.copied().collect();
     flown.reverse();
     // One that the loop was held up with is held back, by design.
     let went = flown.iter().filter(|r| r.send_ns > 0);

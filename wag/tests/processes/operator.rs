@@ -1,7 +1,7 @@
 //! What the operator at the terminal can do: Ctrl-C, and the dead-man switch.
 
-use super::shell::{arm, on_arm, recorded, said};
-use crate::support::{refused_in, send, until};
+use super::shell::{arm, on_arm, recorded};
+use crate::support::{ended, has, refused_in, send, until};
 use arm_model::response::{Estimate, JointResponse, TrackingLag};
 use arm_model::{ArmResponse, JOINTS};
 use rustix::process::Signal;
@@ -29,8 +29,7 @@ fn wait_for_speed(arm: &SimulatedArm) {
 
 /// The command has failed, said so, braked the arm gently and left it standing.
 fn was_braked(arm: &SimulatedArm, child: Child, run: &Path, fault: FaultCode) {
-    let (code, said) = said(child);
-    assert_eq!(code, Some(1), "{said}");
+    let said = ended(child, 1);
     let standing = arm.history().latest().unwrap().state.qd.max_abs();
     assert!(standing < 2e-3, "{standing} rad/s: {said}");
     let (cycles, causes) = recorded(run);
@@ -74,18 +73,14 @@ fn a_dead_man_switch_that_is_not_held_moves_nothing() {
     let (arm, run) = (arm(), folder.path().join("run"));
     // Standard input is at its end from the beginning.
     let child = on_arm(&arm, "wiggle --dead-man", &run).spawn().unwrap();
-    let (code, said) = said(child);
-    assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("DeadManReleased"), "{said}");
+    has(&ended(child, 1), &["DeadManReleased"]);
     let (cycles, _) = recorded(&run);
-    assert!(
-        cycles.iter().all(|c| c.trajectory_s < 0.0),
-        "no motion began"
-    );
+    let still = cycles.iter().all(|c| c.trajectory_s < 0.0);
+    assert!(still, "no motion began");
 }
 
 /// Reads what a child says to people up to `words`.
-fn read_until(child: &mut Child, words: &str) -> String {
+fn read_until(child: &mut Child, words: &str) {
     let stderr = child.stderr.as_mut().unwrap();
     let (mut text, mut byte) = (Vec::new(), [0]);
     while !text.ends_with(words.as_bytes()) {
@@ -93,18 +88,18 @@ fn read_until(child: &mut Child, words: &str) -> String {
         assert_eq!(n, 1, "{}", String::from_utf8_lossy(&text));
         text.extend(byte);
     }
-    String::from_utf8(text).unwrap()
 }
 
-/// A wiggle that asks as a real arm's does, answered by `word` in the start pose.
-fn rehearsed(run: &Path, word: &str) -> (Option<i32>, String) {
+/// A wiggle that asks as a real arm's does, answered by `word` in the start pose; what it said
+/// until it ended with an exit code.
+fn rehearsed(run: &Path, word: &str, code: i32) -> String {
     let arm = arm();
     let mut command = on_arm(&arm, "wiggle --ask --yes --operator Ada", run);
     let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
     read_until(&mut child, "type WIGGLE ");
     let mut stdin = child.stdin.take().unwrap();
     writeln!(stdin, "{word}").unwrap();
-    let said = said(child);
+    let said = ended(child, code);
     drop(stdin);
     said
 }
@@ -113,18 +108,15 @@ fn rehearsed(run: &Path, word: &str) -> (Option<i32>, String) {
 fn a_rehearsal_is_confirmed_in_the_start_pose_and_its_record_says_by_whom() {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
-    let (code, said) = rehearsed(&run, "WIGGLE");
-    assert_eq!(code, Some(0), "{said}");
+    rehearsed(&run, "WIGGLE", 0);
     let summary = std::fs::read_to_string(run.join("summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&summary).unwrap();
     assert_eq!(summary["operator"], "Ada", "{summary:#}");
     let confirmed = &summary["confirmed"][0];
     assert_eq!(confirmed["word"], "WIGGLE", "{summary:#}");
     let ns = |value: &Value| value.as_u64().unwrap();
-    assert!(
-        ns(&confirmed["at_ns"]) < ns(&summary["start_ns"]),
-        "{summary:#}"
-    );
+    let [confirmed_ns, start_ns] = [ns(&confirmed["at_ns"]), ns(&summary["start_ns"])];
+    assert!(confirmed_ns < start_ns, "{summary:#}");
     let steps = summary["bring_up"].as_array().unwrap();
     let named = |name: &str| steps.iter().any(|s| s["step"] == name);
     assert!(named("identify") && named("enable"), "{summary:#}");
@@ -134,9 +126,7 @@ fn a_rehearsal_is_confirmed_in_the_start_pose_and_its_record_says_by_whom() {
 fn another_word_in_the_start_pose_moves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
-    let (code, said) = rehearsed(&run, "wiggle");
-    assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("not confirmed clear"), "{said}");
+    has(&rehearsed(&run, "wiggle", 1), &["not confirmed clear"]);
     let (cycles, _) = recorded(&run);
     let streamed = |c: &CycleRecord| c.mode == ControllerMode::Streaming as u8;
     assert!(!cycles.iter().any(streamed), "no motion began");
@@ -211,17 +201,11 @@ fn an_arm_behind_a_tunnel_is_measured_and_needs_a_clear_area() {
     let measured = tempfile::tempdir().unwrap();
     let line = format!("wiggle --arm 127.0.0.1 --command-port {port}");
     let said = refused_in(folder.path(), 2, &line);
-    assert!(
-        said.contains("not measured") && said.contains("wag latency --arm 127.0.0.1"),
-        "{said}"
-    );
+    has(&said, &["not measured", "wag latency --arm 127.0.0.1"]);
     let response = response(measured.path());
     let line = format!("{line} --arm-response {}", response.display());
     let said = refused_in(folder.path(), 2, &line);
-    assert!(
-        said.contains("does not prove") && said.contains("--yes"),
-        "{said}"
-    );
+    has(&said, &["does not prove", "--yes"]);
     tunnel.join().unwrap();
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -2,10 +2,9 @@
 
 use crate::support::command;
 use arm_model::joint::START_POSE;
-use rt_controller::recording::{Item, LogReader, Read};
 use shared_types::ipc::{CauseRecord, CycleRecord};
 use std::path::Path;
-use std::process::{Child, Command};
+use std::process::Command;
 use xarm_sim::{ArmConfig, SimulatedArm};
 
 /// An arm in this process, at the start pose.
@@ -28,28 +27,16 @@ pub(crate) fn on_arm(arm: &SimulatedArm, line: &str, run: &Path) -> Command {
     command(&format!("{line} --json {address} {ports} --out {out}"))
 }
 
-/// What a child said, once it has ended; its exit code.
-pub(crate) fn said(child: Child) -> (Option<i32>, String) {
-    let output = child.wait_with_output().unwrap();
-    let text = format!(
-        "{}{}",
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr)
-    );
-    (output.status.code(), text)
+/// Cycles of the last trajectory that was streamed, the last one first.
+pub(crate) fn last_flight(cycles: &[CycleRecord]) -> impl Iterator<Item = &CycleRecord> {
+    let from_its_end = cycles.iter().rev().skip_while(|c| c.trajectory_s < 0.0);
+    from_its_end.take_while(|c| c.trajectory_s >= 0.0)
 }
 
 /// Cycles and causes of a run's recording.
 pub(crate) fn recorded(run: &Path) -> (Vec<CycleRecord>, Vec<CauseRecord>) {
     let recording = run_log::Run::open(run).unwrap().recording().unwrap();
-    let (mut cycles, mut causes) = (Vec::new(), Vec::new());
-    for read in LogReader::open(recording.bytes()).unwrap() {
-        match read {
-            Read::Item(Item::Cycle(cycle)) => cycles.push(cycle.record),
-            Read::Item(Item::Cause(cause)) => causes.push(*cause),
-            Read::Item(Item::Keyframe(_) | Item::Motion { .. }) => {}
-            Read::Flaw(flaw) => panic!("{flaw}"),
-        }
-    }
-    (cycles, causes)
+    let log = recording.log().unwrap();
+    assert_eq!(log.flaws, Vec::<String>::new());
+    (recording.cycles().unwrap().cycles, log.causes)
 }

@@ -1,6 +1,7 @@
 //! `wag` as its users start it, a simulated arm to start it against, and what it recorded.
 #![allow(dead_code, reason = "each test uses a part")]
 
+use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, Limits};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
 use rt_controller::control::{ControlState, Thresholds};
@@ -49,6 +50,24 @@ pub(crate) fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// What a child said on both streams, once it has ended as it must, with an exit code.
+#[track_caller]
+pub(crate) fn ended(child: Child, code: i32) -> String {
+    let output = child.wait_with_output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let said = format!("{printed}{}", said(&output));
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    said
+}
+
+/// All of these words must be in a text.
+#[track_caller]
+pub(crate) fn has(text: &str, words: &[&str]) {
+    for word in words {
+        assert!(text.contains(word), "`{word}` is not in\n{text}");
+    }
+}
+
 /// Runs a command that must succeed; what `--json` prints.
 pub(crate) fn json(line: &str) -> Value {
     json_in(Path::new("."), line)
@@ -78,10 +97,8 @@ pub(crate) fn are_refused_in(folder: &Path, code: i32, cases: &str) {
         let (line, words) = case.split_once("=>").unwrap();
         let said = refused_in(folder, code, line);
         for word in words.split('|').map(str::trim) {
-            assert!(
-                said.contains(word),
-                "wag {line}: `{word}` is not in: {said}"
-            );
+            let told = said.contains(word);
+            assert!(told, "wag {line}: `{word}` is not in: {said}");
         }
         for word in ["panicked", ".tmp"] {
             assert!(!said.contains(word), "wag {line}: {said}");
@@ -98,6 +115,15 @@ pub(crate) fn calibrate(folder: &Path, camera: &StereoCamera, mode: VideoMode) -
     write_factory_conf(&folder.join(conf), camera, mode).unwrap();
     write_camera_toml(&path, camera, mode, conf).unwrap();
     path
+}
+
+/// A throw of one second from the start pose: joints 2 and 6 go back by these (rad).
+pub(crate) fn throw(back_rad: [f64; 2]) -> JointTrajectory {
+    let mut end = START_POSE;
+    end[1] -= back_rad[0];
+    end[5] -= back_rad[1];
+    let middle = (START_POSE + end) * 0.5;
+    JointTrajectory::new(&[0.0, 0.5, 1.0], &[START_POSE, middle, end]).unwrap()
 }
 
 /// A plan of a motion as `plan.json` contains it.
@@ -165,11 +191,8 @@ pub(crate) fn processes_of(run_or_parent: &str) -> Vec<(u32, String)> {
 
 /// One of them by its name, `None` while it is not there.
 pub(crate) fn process_of(run_or_parent: &str, name: &str) -> Option<u32> {
-    let found = processes_of(run_or_parent);
-    found
-        .into_iter()
-        .find(|(_, n)| n == name)
-        .map(|(pid, _)| pid)
+    let mut found = processes_of(run_or_parent).into_iter();
+    found.find_map(|(pid, n)| (n == name).then_some(pid))
 }
 
 /// Waits until so many control cycles lie in the file of a run under way.

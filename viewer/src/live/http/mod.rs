@@ -53,12 +53,10 @@ pub(crate) struct Site {
 }
 
 impl Site {
-    /// Whether a page follows the state.
     pub(crate) fn is_followed(&self) -> bool {
         self.followers.load(Ordering::SeqCst) > 0
     }
 
-    /// Whether somebody looks at the camera's pictures.
     pub(crate) fn wants_pictures(&self) -> bool {
         let requested = self.picture_asked.lock();
         requested

@@ -110,7 +110,7 @@ impl DemoRecord {
             command: "demo",
             version: shared_types::VERSION,
             seed,
-            run: folder.path().display().to_string(),
+            run: folder.path.display().to_string(),
             task: "strike",
             target_m,
             ..Self::default()
@@ -131,8 +131,6 @@ impl DemoRecord {
         }));
     }
 
-    /// Keeps the camera's score. That the camera could not see the throw does
-    /// not undo the throw; it is reported.
     pub fn set_score(&mut self, score: anyhow::Result<ScoreResult>) {
         match score {
             Ok(score) => {
@@ -146,25 +144,26 @@ impl DemoRecord {
     /// Keeps the truth, known only because the rig is simulated; the throw is complete
     /// with it.
     pub fn set_truth(&mut self, truth: RigEvent) -> anyhow::Result<()> {
-        let (rope, closest_m, peak_tip_speed_m_s, touched) = match truth {
+        match truth {
             RigEvent::Truth {
                 rope,
                 closest_m,
                 peak_tip_speed_m_s,
                 touched,
                 ..
-            } => (rope, closest_m, peak_tip_speed_m_s, touched),
+            } => {
+                self.true_tip_target_distance_m = Some(closest_m);
+                self.true_rope = Some(rope);
+                self.truth = Some(json!({
+                    "rope": rope, "closest_m": closest_m, "peak_tip_speed_m_s": peak_tip_speed_m_s,
+                    "rope_touched_robot": touched,
+                }));
+                self.ok = true;
+                Ok(())
+            }
             RigEvent::Failed { message } => bail!(message),
             other => bail!("the rig answered with {other:?}"),
-        };
-        self.true_tip_target_distance_m = Some(closest_m);
-        self.true_rope = Some(rope);
-        self.truth = Some(json!({
-            "rope": rope, "closest_m": closest_m, "peak_tip_speed_m_s": peak_tip_speed_m_s,
-            "rope_touched_robot": touched,
-        }));
-        self.ok = true;
-        Ok(())
+        }
     }
 }
 

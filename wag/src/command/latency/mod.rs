@@ -73,10 +73,8 @@ fn examine(evidence: &Evidence) -> anyhow::Result<Findings<'_>> {
         stage.say(format!("joint {} of {JOINTS}", joint + 1));
     })
     .with_context(|| evidence.source.clone())?;
-    let target_delay = evidence
-        .has_targets
-        .then(|| command_to_target(&recording))
-        .flatten();
+    let seen = evidence.has_targets.then_some(&recording);
+    let target_delay = seen.and_then(command_to_target);
     let findings = Findings {
         evidence,
         latencies,
