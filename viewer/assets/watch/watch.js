@@ -4,7 +4,7 @@ const byId = (id) => document.getElementById(id);
 // Twenty-five times a second also without a graphics card: smooth edges cost half of that.
 const view = new View(byId("view"), false);
 const TIPS_MAX = 150;
-const WORDS = { stop: "Stop", disarm: "Disarm", acknowledge: "Acknowledge" };
+const WORDS = { stop: "Stop", disarm: "Disarm" };
 const words = (name) => String(name).replaceAll("_", " ");
 /** What a test may read. */
 const watched = { states: 0, drawn: 0, pictures: 0, last: null };

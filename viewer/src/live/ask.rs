@@ -3,16 +3,16 @@
 use super::attached::Seen;
 use anyhow::Context;
 use serde::Serialize;
+use shared_types::ipc::Bus;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::{Pending, RpcClient};
-use shared_types::ipc::{Bus, ControllerMode};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 /// Longest wait for the controller's answer.
 const PATIENCE: Duration = Duration::from_secs(6);
 
-/// A wish. None of them can make the arm move.
+/// A wish. None of them can make the arm move, or enable it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Ask {
@@ -20,20 +20,17 @@ pub(crate) enum Ask {
     Stop,
     /// Withdraw the arming.
     Disarm,
-    /// Accept the fault.
-    Acknowledge,
 }
 
 impl Ask {
     /// All of them, in the order of the page's buttons.
-    pub(crate) const ALL: [Self; 3] = [Self::Stop, Self::Disarm, Self::Acknowledge];
+    pub(crate) const ALL: [Self; 2] = [Self::Stop, Self::Disarm];
 
     /// As in an address.
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Stop => "stop",
             Self::Disarm => "disarm",
-            Self::Acknowledge => "acknowledge",
         }
     }
 
@@ -45,7 +42,6 @@ impl Ask {
         match self {
             Self::Stop => ControllerRequest::Stop,
             Self::Disarm => ControllerRequest::Disarm,
-            Self::Acknowledge => ControllerRequest::Acknowledge,
         }
     }
 
@@ -55,12 +51,10 @@ impl Ask {
             return Some("no controller runs");
         };
         let is_armed = now.state.operating_mode != 0;
-        let is_faulted = ControllerMode::from_raw(now.state.mode) == ControllerMode::Faulted;
         match self {
             Self::Stop => None,
             _ if !now.operator => Some("there is no operator"),
             Self::Disarm => (!is_armed).then_some("nothing is armed"),
-            Self::Acknowledge => (!is_faulted).then_some("there is no fault to accept"),
         }
     }
 }
@@ -136,7 +130,7 @@ impl Open {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shared_types::ipc::ControllerState;
+    use shared_types::ipc::{ControllerMode, ControllerState};
 
     #[test]
     fn a_stop_needs_a_controller_only_and_everything_else_an_operator() {
@@ -164,7 +158,9 @@ mod tests {
         }
         let still = seen(ControllerMode::Idle, 0, true);
         assert!(Ask::Disarm.objection(Some(&still)).is_some());
-        assert!(Ask::Acknowledge.objection(Some(&still)).is_some());
-        assert_eq!(Ask::named("move"), None);
+        // Drives are enabled again only by who stands at the arm.
+        for other in ["move", "acknowledge"] {
+            assert_eq!(Ask::named(other), None);
+        }
     }
 }

@@ -29,7 +29,7 @@ pub(crate) struct Wires {
     end: AtomicBool,
     operate: AtomicBool,
     pub(crate) stops: AtomicUsize,
-    pub(crate) acknowledgements: AtomicUsize,
+    pub(crate) disarms: AtomicUsize,
 }
 
 /// One that runs until it is dropped.
@@ -153,9 +153,8 @@ fn serve(server: &RpcServer<ControllerRpc>, wires: &Wires, fault: &mut FaultCode
                 *fault = FaultCode::OperatorStop;
                 wires.stops.fetch_add(1, Ordering::SeqCst);
             }
-            ControllerRequest::Acknowledge => {
-                *fault = FaultCode::None;
-                wires.acknowledgements.fetch_add(1, Ordering::SeqCst);
+            ControllerRequest::Disarm => {
+                wires.disarms.fetch_add(1, Ordering::SeqCst);
             }
             _ => {}
         }

@@ -85,21 +85,17 @@ fn a_stop_needs_no_operator_and_nothing_else_goes_without_one() {
     let words = state["controller"]["stop"]["words"].as_str().unwrap();
     assert!(words.contains("asked for a stop"), "{words}");
     assert_eq!(state["asks"][0], json!(["stop", null]));
-    let refused = json!(["acknowledge", "there is no operator"]);
-    assert_eq!(state["asks"][2], refused);
-    for path in ["ask/acknowledge", "ask/disarm"] {
-        let refused = watch.ask("POST", path);
-        assert_eq!(refused.status, 409);
-        assert_eq!(refused.body, b"there is no operator");
-    }
-    assert_eq!(fake.wires.acknowledgements.load(Ordering::SeqCst), 0);
+    assert_eq!(state["asks"][1], json!(["disarm", "there is no operator"]));
+    let refused = watch.ask("POST", "ask/disarm");
+    assert_eq!(refused.status, 409);
+    assert_eq!(refused.body, b"there is no operator");
+    // A stop is acknowledged at the arm.
+    assert_eq!(watch.ask("POST", "ask/acknowledge").status, 404);
+    assert_eq!(fake.wires.disarms.load(Ordering::SeqCst), 0);
     fake.operate(true);
     states.until("the operator", |s| s["controller"]["operator"] == true);
-    assert_eq!(watch.ask("POST", "ask/acknowledge").status, 200);
-    assert_eq!(fake.wires.acknowledgements.load(Ordering::SeqCst), 1);
-    states.until("the acknowledgement", |s| {
-        s["controller"]["stop"]["latched"] == false
-    });
+    assert_eq!(watch.ask("POST", "ask/disarm").status, 200);
+    assert_eq!(fake.wires.disarms.load(Ordering::SeqCst), 1);
     fake.operate(false);
     states.until("no operator", |s| s["controller"]["operator"] == false);
 }
