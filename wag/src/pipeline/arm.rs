@@ -86,9 +86,10 @@ pub fn acquire(session: &mut Session, arm: &ArmLink, found: &mut BringUp) -> any
 /// Enables the arm, also after a stop, which is acknowledged by it.
 pub fn enable(session: &mut Session, arm: &ArmLink, found: &mut BringUp) -> anyhow::Result<()> {
     let bring_up = match session.ask(arm, &ControllerRequest::Status, 5.0, |_| ())? {
-        ControllerEvent::Status { mode, .. } if mode == ControllerMode::Faulted => {
-            ControllerRequest::Acknowledge
-        }
+        ControllerEvent::Status {
+            mode: ControllerMode::Faulted,
+            ..
+        } => ControllerRequest::Acknowledge,
         _ => ControllerRequest::Bringup,
     };
     let done = session.ask(arm, &bring_up, 20.0, |event| {
