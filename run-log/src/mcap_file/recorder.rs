@@ -154,7 +154,7 @@ impl Recording {
             &[
                 ("version", shared_types::VERSION.to_owned()),
                 ("domain", config.domain.clone()),
-                ("wall_minus_monotonic_ns", clock.ahead_ns().to_string()),
+                ("wall_minus_monotonic_ns", clock.ahead_ns.to_string()),
                 ("pictures_hz", config.pictures_hz.to_string()),
             ],
         )?;
