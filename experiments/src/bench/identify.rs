@@ -1,10 +1,9 @@
 //! `experiments bench identify`: time to identify one rope, by method, on all cores.
 
-use super::report::{report, verdict};
 use super::spent::least;
 use crate::args::BenchArgs;
 use crate::network::{network, with_network};
-use crate::report::{Column, print_table};
+use crate::report::{Column, print_table, report, verdict};
 use cli_output::{Machine, OrInput, Outcome, Stage};
 use experiments::trials::TrialRig;
 use planner::identify::{IdentifyOptions, Method};

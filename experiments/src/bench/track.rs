@@ -1,9 +1,9 @@
 //! `experiments bench track`: time per frame of each stage of tracking a recorded wiggle, and
 //! the memory it takes.
 
-use super::report::report;
 use super::spent::{Spent, least};
 use crate::args::BenchArgs;
+use crate::report::report;
 use anyhow::Context;
 use arm_model::Pole;
 use camera_ingest::source::{FrameSource, StereoSource, read_film};
@@ -137,8 +137,8 @@ pub(super) fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
         let row = |name: &str, t: Spent| [name.to_owned(), ms(t.cpu_s), ms(t.wall_s)];
         let mut rows = vec![row("decoding", least.decoding)];
         for (name, t) in STAGES.iter().zip(least.stages) {
-            let name = format!("tracking: {}", name.replace('_', " "));
-            rows.push([name, String::new(), ms(t.as_secs_f64())]);
+            let stage = format!("tracking: {name}");
+            rows.push([stage, String::new(), ms(t.as_secs_f64())]);
         }
         rows.push(row("tracking", least.tracking));
         rows.push(row("together", together));

@@ -7,8 +7,7 @@ mod scaling;
 mod workload;
 
 use crate::args::BenchArgs;
-use crate::bench::report::report;
-use crate::report::print_table;
+use crate::report::{print_table, report};
 use cli_output::{OrInput, Outcome, Stage};
 use serde::Serialize;
 use serde_json::Value;
