@@ -34,18 +34,14 @@ const TABLE: [Column<Row>; 5] = [
     ("limit", |row| verdict(row.limit_wall_s, row.within_limit)),
 ];
 
-/// Ropes and runs of each.
-fn extent(quick: bool) -> (u64, usize) {
-    if quick { (1, 1) } else { (5, 3) }
-}
-
 fn measure(
     rig: &TrialRig,
     args: &BenchArgs,
     (method, limit_wall_s): (&'static str, f64),
     mut identify: impl FnMut(&Filmed, u64) -> Outcome<f64>,
 ) -> Outcome<Row> {
-    let (ropes, repeats) = extent(args.quick);
+    // Ropes and runs of each.
+    let (ropes, repeats) = if args.quick { (1, 1) } else { (5, 3) };
     let (mut wall_s, mut cpu_s, mut simulations) = (0.0, 0.0, 0.0);
     for index in 0..ropes {
         let rope = trial_rope(args.seed, index);
