@@ -346,10 +346,7 @@ pub fn run(config: &RecorderConfig, simulate: SimulateRope, stop: &AtomicBool) -
     listen(config, stop)?.finish(simulate)
 }
 
-/// Records until `stop` is set.
-///
-/// # Errors
-/// Shared memory cannot be joined, or the disk takes nothing any more.
+/// Records until `stop` is set; fails as [`run`] does.
 pub(super) fn listen(config: &RecorderConfig, stop: &AtomicBool) -> Result<Recorded> {
     if let Err(reason) = rustix::process::nice(NICE) {
         tracing::warn!(%reason, "the recorder runs with ordinary priority");
