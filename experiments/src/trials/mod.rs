@@ -132,23 +132,6 @@ impl TrialRig {
     }
 }
 
-impl Trial {
-    /// A trial from a rope and what was found.
-    fn new(index: u64, truth: &RopeParams, found: &RopeEstimate) -> Self {
-        Self {
-            index,
-            truth: truth.to_array(),
-            found: found.params.to_array(),
-            interval_90: found.posterior.interval_90,
-            residual_px: found.residual_px,
-            out_of_distribution: found.out_of_distribution.score,
-            outside: found.out_of_distribution.is_outside(),
-            method: found.method.to_string(),
-            simulations: found.simulations,
-        }
-    }
-}
-
 /// Makes the trials (or what else `name` says) with these numbers, in parallel; in their
 /// order, whatever the threads. After a failure no further one is begun.
 ///
@@ -184,7 +167,17 @@ pub fn run(
         let truth = rope(index);
         let filmed = rig.film(&truth, options.seed, index)?;
         let found = rig.fit(&filmed, index, &alone(options))?;
-        Ok(Trial::new(index, &truth, &found))
+        Ok(Trial {
+            index,
+            truth: truth.to_array(),
+            found: found.params.to_array(),
+            interval_90: found.posterior.interval_90,
+            residual_px: found.residual_px,
+            out_of_distribution: found.out_of_distribution.score,
+            outside: found.out_of_distribution.is_outside(),
+            method: found.method.to_string(),
+            simulations: found.simulations,
+        })
     })
 }
 
