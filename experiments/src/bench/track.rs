@@ -69,17 +69,7 @@ impl Pass {
     }
 }
 
-/// A film, what filmed it, and how the clamp moved.
-type Recording = (Box<dyn StereoSource>, StereoCamera, Box<dyn AttachMotion>);
-
-/// What is measured with: `video.avi`, `camera.toml` and the clamp's motion.
-fn recording(folder: &Path) -> Outcome<Recording> {
-    let camera = load_camera(&folder.join("camera.toml")).or_input()?;
-    let video = open_video(folder, None).or_input()?;
-    Ok((video, camera, motion(folder)?))
-}
-
-/// From measured joints where there are some, else from poses.
+/// The clamp's motion, from measured joints where there are some, else from poses.
 fn motion(folder: &Path) -> Outcome<Box<dyn AttachMotion>> {
     let joints = folder.join("joints.csv");
     if joints.exists() {
@@ -103,7 +93,9 @@ pub(super) fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
              camera.toml and pose.csv or joints.csv"
         )
     })?;
-    let (mut video, camera, motion) = recording(folder)?;
+    let camera = load_camera(&folder.join("camera.toml")).or_input()?;
+    let mut video = open_video(folder, None).or_input()?;
+    let motion = motion(folder)?;
     let stage = Stage::begin("bench");
     let mut least = Pass::over(&mut video, &camera, &*motion)?;
     let peak_mb = peak_mb();
