@@ -139,7 +139,7 @@ pub fn explain(log: &RunLog) -> Explanation {
 /// A controller that ends tells its loop to stop; with the arm at rest nothing
 /// is stopped by that.
 fn is_orderly_end(cause: &CauseRecord) -> bool {
-    cause.fault() == FaultCode::OperatorStop && cause.mode_then() == ControllerMode::Idle
+    cause.fault() == FaultCode::OperatorStop && cause.mode == ControllerMode::Idle as u8
 }
 
 fn stop(log: &RunLog, cause: &CauseRecord) -> Stop {
@@ -165,7 +165,7 @@ fn stop(log: &RunLog, cause: &CauseRecord) -> Stop {
         arm_warning: cause.arm_warning,
         cycle: cause.cycle,
         time_s: log.time_s(cause.stamp_ns),
-        mode: cause.mode_then(),
+        mode: ControllerMode::from_raw(cause.mode),
         operating_mode: OperatingMode::from_raw(cause.operating_mode).map(operating_mode_name),
         motion: Some(cause.motion_id).filter(|id| *id != 0),
         motion_s: Some(cause.trajectory_s).filter(|t| *t >= 0.0),
