@@ -125,10 +125,11 @@ pub struct Row {
 /// Explains a recording.
 pub fn explain(log: &RunLog) -> Explanation {
     let (ends, stops): (Vec<_>, Vec<_>) = log.causes.iter().partition(|c| is_orderly_end(c));
+    let last = log.samples.last();
     Explanation {
         stopped: !stops.is_empty(),
         cycles: log.samples.len(),
-        duration_s: log.duration_s(),
+        duration_s: last.map_or(0.0, |m| log.time_s(m.deadline_ns)),
         stops: stops.into_iter().map(|c| stop(log, c)).collect(),
         ended_in_order: !ends.is_empty(),
         margins: smallest_margins(log),
