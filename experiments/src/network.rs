@@ -7,10 +7,7 @@ use planner::phi::PhiNet;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The network of `model`, or the built-in one.
-///
-/// # Errors
-/// Why it is refused: bad input for a file.
+/// The network of `model`, or the built-in one; a file that is refused is bad input.
 pub fn network(model: Option<&Path>) -> Outcome<PhiNet> {
     match model {
         Some(path) => PhiNet::load(path).or_input(),
@@ -20,9 +17,7 @@ pub fn network(model: Option<&Path>) -> Outcome<PhiNet> {
 
 /// Gives a rig the network if the method asks one, and lets it film what the network
 /// reads.
-///
-/// # Errors
-/// As [`network`], a model for a method that asks none, or one that a fit cannot follow.
+/// Refuses a model for a method that asks none, and one that a fit cannot follow.
 pub fn with_network(rig: &mut TrialRig, method: Method, model: Option<&Path>) -> Outcome {
     if !method.asks_network() {
         return match model {

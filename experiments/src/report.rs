@@ -1,17 +1,15 @@
 //! What the commands print: tables for people, one JSON object for `--json`.
 
-use cli_output::table::numbers;
-use serde_json::Value;
-
-/// A column of a table: its header, and what stands in it for a row.
-pub type Column<R> = (&'static str, fn(&R) -> String);
+use crate::args::BenchArgs;
+use cli_output::Machine;
+pub use cli_output::table::Column;
+use cli_output::table::columns;
+use serde_json::{Value, json};
 
 /// Prints a table whose first column is text and whose other columns are numbers, but for
 /// the last `text_columns`.
-pub fn print_table<R, const N: usize>(rows: &[R], text_columns: usize, columns: [Column<R>; N]) {
-    let header = columns.map(|(name, _)| name);
-    let cells = rows.iter().map(|row| columns.map(|(_, cell)| cell(row)));
-    println!("{}", numbers(header, text_columns, cells));
+pub fn print_table<R, const N: usize>(rows: &[R], text_columns: usize, table: [Column<R>; N]) {
+    println!("{}", columns(table, text_columns, rows));
 }
 
 /// The fields of `common`, then those of `own`.
@@ -20,4 +18,22 @@ pub fn joined(mut common: Value, own: Value) -> Value {
         fields.extend(own);
     }
     common
+}
+
+/// Prints a benchmark's machine and tables, and returns what `--json` prints: `own` fields
+/// in addition to those of every benchmark.
+pub fn report(args: &BenchArgs, command: &str, own: Value, print: impl FnOnce()) -> Option<Value> {
+    let machine = Machine::here();
+    println!("{machine}");
+    print();
+    let common = json!({
+        "ok": true, "command": command, "machine": machine, "seed": args.seed,
+        "quick": args.quick,
+    });
+    Some(joined(common, own))
+}
+
+/// Whether a time limit (s) was kept.
+pub fn verdict(limit_s: f64, kept: bool) -> String {
+    format!("{limit_s} s {}", if kept { "kept" } else { "exceeded" })
 }

@@ -15,10 +15,6 @@ fn json<T: Serialize + DeserializeOwned>(text: &str) -> Option<T> {
 }
 
 /// Reads `data` as each kind.
-///
-/// # Panics
-/// When something that was read cannot be written and read again, or a
-/// trajectory holds a number that is not finite.
 pub fn run(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else {
         return;

@@ -8,10 +8,6 @@ use std::fs::write;
 const BREAK: &[u8] = b"\n=====\n";
 
 /// Reads the two parts of `data` as `camera.toml` and `camera.conf`.
-///
-/// # Panics
-/// When the temporary folder cannot be written, or a camera holds a number that
-/// is not finite.
 pub fn run(data: &[u8]) {
     let at = data.windows(BREAK.len()).position(|w| w == BREAK);
     let (settings, factory) = match at {

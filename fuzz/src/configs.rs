@@ -16,9 +16,6 @@ fn again<T: Serialize + DeserializeOwned + PartialEq + Debug>(text: &str) -> Opt
 
 /// Reads `data` as each kind; what passes its checks resolves, and what was read
 /// can be written and read again.
-///
-/// # Panics
-/// When a configuration that was read cannot be written and read again.
 pub fn run(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else {
         return;

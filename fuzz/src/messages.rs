@@ -31,9 +31,6 @@ fn message<T: Serialize + DeserializeOwned>(body: &[u8]) {
 }
 
 /// Reads `data` as the message that its first byte picks.
-///
-/// # Panics
-/// When a message that was read cannot be written and read again.
 pub fn run(data: &[u8]) {
     let Some((kind, body)) = data.split_first() else {
         return;

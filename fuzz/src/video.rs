@@ -8,9 +8,6 @@ use camera_ingest::source::{FrameSource, StereoSource};
 const PICTURES: usize = 3;
 
 /// Opens `data` as a film and decodes its first pictures.
-///
-/// # Panics
-/// When the temporary folder cannot be written.
 pub fn run(data: &[u8]) {
     let path = folder().join("video.avi");
     std::fs::write(&path, data).expect("a film");

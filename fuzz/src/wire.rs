@@ -93,9 +93,6 @@ fn report(frame: &[u8]) {
 }
 
 /// Reads `data` as everything that may come over the wire.
-///
-/// # Panics
-/// When a reader stalls, or when cutting the stream changes what is read.
 pub fn run(data: &[u8]) {
     let Some((cut, bytes)) = data.split_first() else {
         return;

@@ -62,9 +62,6 @@ pub fn open(bytes: &[u8]) -> Result<Session, OpenError> {
 pub type Input<'a> = (&'a str, &'a [usize], &'a [f32]);
 
 /// The numbers of the outputs with these names.
-///
-/// # Errors
-/// What the runtime says.
 pub fn outputs<const I: usize, const O: usize>(
     session: &mut Session,
     inputs: [Input<'_>; I],

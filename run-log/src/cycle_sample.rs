@@ -160,13 +160,6 @@ impl RunLog {
         let first = self.samples.first().map_or(stamp_ns, |m| m.deadline_ns);
         MonotonicNs(stamp_ns).since_s(MonotonicNs(first))
     }
-
-    /// Seconds from the first to the last cycle.
-    pub fn duration_s(&self) -> f64 {
-        self.samples
-            .last()
-            .map_or(0.0, |m| self.time_s(m.deadline_ns))
-    }
 }
 
 /// What is remembered from cycle to cycle to see speeds and ages.

@@ -1,7 +1,6 @@
 //! What the control loop did and was told: tables of it, and what they show of the arm.
 
 use crate::files;
-use crate::mcap_file::mode_name;
 use anyhow::Result;
 use arm_model::JointVector;
 use shared_types::ipc::{ControllerMode, CycleRecord, JointReport};
@@ -64,10 +63,10 @@ impl Cycles {
         for c in &self.cycles {
             write!(
                 text,
-                "{},{:.6},{},{:?},{},{:.1},{:.1},{:.1},{:.1},{},{},{:.6}",
+                "{},{:.6},{:?},{:?},{},{:.1},{:.1},{:.1},{:.1},{},{},{:.6}",
                 c.cycle,
                 since(c.deadline_ns),
-                mode_name(ControllerMode::from_raw(c.mode)),
+                ControllerMode::from_raw(c.mode),
                 FaultCode::from_raw(c.fault).unwrap_or_default(),
                 c.sent,
                 f64::from(c.wake_late_ns) / 1e3,

@@ -125,10 +125,11 @@ pub struct Row {
 /// Explains a recording.
 pub fn explain(log: &RunLog) -> Explanation {
     let (ends, stops): (Vec<_>, Vec<_>) = log.causes.iter().partition(|c| is_orderly_end(c));
+    let last = log.samples.last();
     Explanation {
         stopped: !stops.is_empty(),
         cycles: log.samples.len(),
-        duration_s: log.duration_s(),
+        duration_s: last.map_or(0.0, |m| log.time_s(m.deadline_ns)),
         stops: stops.into_iter().map(|c| stop(log, c)).collect(),
         ended_in_order: !ends.is_empty(),
         margins: smallest_margins(log),
@@ -139,7 +140,7 @@ pub fn explain(log: &RunLog) -> Explanation {
 /// A controller that ends tells its loop to stop; with the arm at rest nothing
 /// is stopped by that.
 fn is_orderly_end(cause: &CauseRecord) -> bool {
-    cause.fault() == FaultCode::OperatorStop && cause.mode_then() == ControllerMode::Idle
+    cause.fault() == FaultCode::OperatorStop && cause.mode == ControllerMode::Idle as u8
 }
 
 fn stop(log: &RunLog, cause: &CauseRecord) -> Stop {
@@ -165,7 +166,7 @@ fn stop(log: &RunLog, cause: &CauseRecord) -> Stop {
         arm_warning: cause.arm_warning,
         cycle: cause.cycle,
         time_s: log.time_s(cause.stamp_ns),
-        mode: cause.mode_then(),
+        mode: ControllerMode::from_raw(cause.mode),
         operating_mode: OperatingMode::from_raw(cause.operating_mode).map(operating_mode_name),
         motion: Some(cause.motion_id).filter(|id| *id != 0),
         motion_s: Some(cause.trajectory_s).filter(|t| *t >= 0.0),

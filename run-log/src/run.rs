@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use arm_model::Cell;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde_json::Value;
-use shared_types::{KeypointTrack, Plan, RopeParams};
+use shared_types::{Plan, RopeParams};
 use std::path::{Path, PathBuf};
 
 /// A run. What a folder does not hold is `None`; what it holds and is damaged is an error
@@ -118,11 +118,6 @@ impl Run {
     /// Every figure of it.
     pub fn summary(&self) -> Result<Option<Value>> {
         self.file(files::SUMMARY, files::read_json)
-    }
-
-    /// The tracked keypoints.
-    pub fn keypoints(&self) -> Result<Option<KeypointTrack>> {
-        self.file(files::KEYPOINTS, files::read_json)
     }
 
     /// The cell it ran in; runs of older versions do not tell it.

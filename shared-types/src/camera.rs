@@ -117,12 +117,6 @@ impl StereoCamera {
         self.r_w_cam.tr_mul(&(p_w_m - self.p_w_cam_m))
     }
 
-    /// World point in the right optical frame (m).
-    #[must_use]
-    pub fn to_right(&self, p_w_m: &Vector3<f64>) -> Vector3<f64> {
-        self.r_right_left * self.to_left(p_w_m) - self.t_right_left_m
-    }
-
     /// Raw left-eye pixel of a world point; `None` behind the camera.
     #[must_use]
     pub fn project_left(&self, p_w_m: &Vector3<f64>) -> Option<[f64; 2]> {
@@ -132,7 +126,8 @@ impl StereoCamera {
     /// Raw right-eye pixel of a world point; `None` behind the camera.
     #[must_use]
     pub fn project_right(&self, p_w_m: &Vector3<f64>) -> Option<[f64; 2]> {
-        self.right.project(&self.to_right(p_w_m))
+        let p_right_m = self.r_right_left * self.to_left(p_w_m) - self.t_right_left_m;
+        self.right.project(&p_right_m)
     }
 
     /// Whether a raw pixel lies inside the image.
@@ -167,8 +162,7 @@ impl StereoCamera {
     }
 
     /// Ray through a raw right pixel in the world: (origin in m, unit direction).
-    #[must_use]
-    pub fn right_ray(&self, pixel: [f64; 2]) -> (Vector3<f64>, Vector3<f64>) {
+    fn right_ray(&self, pixel: [f64; 2]) -> (Vector3<f64>, Vector3<f64>) {
         let [x, y] = self.right.undistort(pixel);
         let to_world = self.r_w_cam * self.r_right_left.transpose();
         let origin = self.p_w_cam_m + to_world * self.t_right_left_m;

@@ -1,10 +1,9 @@
 //! `experiments bench identify`: time to identify one rope, by method, on all cores.
 
-use super::report::{report, verdict};
 use super::spent::least;
 use crate::args::BenchArgs;
 use crate::network::{network, with_network};
-use crate::report::{Column, print_table};
+use crate::report::{Column, print_table, report, verdict};
 use cli_output::{Machine, OrInput, Outcome, Stage};
 use experiments::trials::TrialRig;
 use planner::identify::{IdentifyOptions, Method};
@@ -35,18 +34,14 @@ const TABLE: [Column<Row>; 5] = [
     ("limit", |row| verdict(row.limit_wall_s, row.within_limit)),
 ];
 
-/// Ropes and runs of each.
-fn extent(quick: bool) -> (u64, usize) {
-    if quick { (1, 1) } else { (5, 3) }
-}
-
 fn measure(
     rig: &TrialRig,
     args: &BenchArgs,
     (method, limit_wall_s): (&'static str, f64),
     mut identify: impl FnMut(&Filmed, u64) -> Outcome<f64>,
 ) -> Outcome<Row> {
-    let (ropes, repeats) = extent(args.quick);
+    // Ropes and runs of each.
+    let (ropes, repeats) = if args.quick { (1, 1) } else { (5, 3) };
     let (mut wall_s, mut cpu_s, mut simulations) = (0.0, 0.0, 0.0);
     for index in 0..ropes {
         let rope = trial_rope(args.seed, index);

@@ -5,7 +5,6 @@
 
 mod identify;
 mod plan;
-mod report;
 mod rope;
 mod spent;
 mod track;

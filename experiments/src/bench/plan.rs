@@ -1,9 +1,8 @@
 //! `experiments bench plan`: time to plan one throw of each task, and what it is spent on.
 
-use super::report::{report, verdict};
 use super::spent::least;
 use crate::args::BenchArgs;
-use crate::report::{Column, print_table};
+use crate::report::{Column, print_table, report, verdict};
 use cli_output::{OrInput, Outcome, Stage};
 use planner::PlannerConfig;
 use planner::plan::{PlanOptions, PlanRequest, ThrowSimulator, simulator_for};

@@ -32,9 +32,6 @@ fn process_cpu_s() -> f64 {
 /// Does the work `repeats` times; returns the smallest times, each by itself, and the
 /// last result. Other load on the machine only ever adds time, so the smallest is the
 /// best estimate.
-///
-/// # Errors
-/// The first error of the work.
 pub fn least<T, E>(
     repeats: usize,
     mut work: impl FnMut() -> Result<T, E>,

@@ -1,9 +1,9 @@
 //! `experiments bench track`: time per frame of each stage of tracking a recorded wiggle, and
 //! the memory it takes.
 
-use super::report::report;
 use super::spent::{Spent, least};
 use crate::args::BenchArgs;
+use crate::report::report;
 use anyhow::Context;
 use arm_model::Pole;
 use camera_ingest::source::{FrameSource, StereoSource, read_film};
@@ -69,17 +69,7 @@ impl Pass {
     }
 }
 
-/// A film, what filmed it, and how the clamp moved.
-type Recording = (Box<dyn StereoSource>, StereoCamera, Box<dyn AttachMotion>);
-
-/// What is measured with: `video.avi`, `camera.toml` and the clamp's motion.
-fn recording(folder: &Path) -> Outcome<Recording> {
-    let camera = load_camera(&folder.join("camera.toml")).or_input()?;
-    let video = open_video(folder, None).or_input()?;
-    Ok((video, camera, motion(folder)?))
-}
-
-/// From measured joints where there are some, else from poses.
+/// The clamp's motion, from measured joints where there are some, else from poses.
 fn motion(folder: &Path) -> Outcome<Box<dyn AttachMotion>> {
     let joints = folder.join("joints.csv");
     if joints.exists() {
@@ -103,7 +93,9 @@ pub(super) fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
              camera.toml and pose.csv or joints.csv"
         )
     })?;
-    let (mut video, camera, motion) = recording(folder)?;
+    let camera = load_camera(&folder.join("camera.toml")).or_input()?;
+    let mut video = open_video(folder, None).or_input()?;
+    let motion = motion(folder)?;
     let stage = Stage::begin("bench");
     let mut least = Pass::over(&mut video, &camera, &*motion)?;
     let peak_mb = peak_mb();
@@ -137,8 +129,8 @@ pub(super) fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
         let row = |name: &str, t: Spent| [name.to_owned(), ms(t.cpu_s), ms(t.wall_s)];
         let mut rows = vec![row("decoding", least.decoding)];
         for (name, t) in STAGES.iter().zip(least.stages) {
-            let name = format!("tracking: {}", name.replace('_', " "));
-            rows.push([name, String::new(), ms(t.as_secs_f64())]);
+            let stage = format!("tracking: {name}");
+            rows.push([stage, String::new(), ms(t.as_secs_f64())]);
         }
         rows.push(row("tracking", least.tracking));
         rows.push(row("together", together));

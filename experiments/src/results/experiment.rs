@@ -1,7 +1,7 @@
 //! What every result shares: set-up, trials that survive an interruption, report.
 
 use super::checkpoint::Checkpoint;
-use super::picture::{Curve, Picture};
+use super::picture::{self, Curve};
 use crate::args::ResultArgs;
 use crate::network::with_network;
 use crate::report::{Column, joined, print_table};
@@ -164,14 +164,8 @@ impl<'a> Experiment<'a> {
 
     /// Draws the distributions next to the result file, if there is one.
     pub fn picture(&self, axis: &str, curves: Vec<Curve>) -> Outcome<Option<PathBuf>> {
-        let (name, seed) = (self.name, self.args.seed);
-        let picture = Picture {
-            name,
-            axis,
-            seed,
-            curves,
-        };
-        picture.write(self.args.out.as_deref())
+        let of = (self.name, self.args.seed);
+        picture::write(self.args.out.as_deref(), of, axis, &curves)
     }
 
     /// Ends a run of so many ropes whose result is the rows of a table, each a curve over

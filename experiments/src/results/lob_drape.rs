@@ -129,35 +129,9 @@ fn trials(
     })
 }
 
-/// Fractions of the ropes, and the distance of drapes.
-struct Summary {
-    hit: f64,
-    hit_and_stay: f64,
-    draped: f64,
-    midpoint_m: f64,
-}
-
-fn met(verdict: &Verdict, name: &str) -> bool {
-    verdict.conditions.iter().any(|c| c.name == name && c.met)
-}
-
-fn summarise(trials: &[LobDrapeTrial]) -> Summary {
-    let fraction = |good: &dyn Fn(&LobDrapeTrial) -> bool| {
-        mean(trials.iter().map(|t| f64::from(u8::from(good(t)))))
-    };
-    let lob = |t: &LobDrapeTrial, name: &str| t.lob.as_ref().is_some_and(|l| met(&l.verdict, name));
-    let draped: Vec<f64> = trials
-        .iter()
-        .filter_map(|t| t.drape.as_ref().filter(|d| d.verdict.success))
-        .map(|d| d.error_m)
-        .collect();
-    let midpoint_m = draped.iter().sum::<f64>() / draped.len() as f64;
-    Summary {
-        hit: fraction(&|t| lob(t, "target hit")),
-        hit_and_stay: fraction(&|t| t.lob.as_ref().is_some_and(|l| l.verdict.success)),
-        draped: fraction(&|t| t.drape.as_ref().is_some_and(|d| d.verdict.success)),
-        midpoint_m,
-    }
+fn is_target_hit(lob: &Judged) -> bool {
+    let mut conditions = lob.verdict.conditions.iter();
+    conditions.any(|c| c.name == "target hit" && c.met)
 }
 
 const TABLE: [Column<LobDrapeTrial>; 5] = [
@@ -198,7 +172,18 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
         ..requested
     };
     let trials = experiment.trials(sequence, |batch| trials(&experiment, &scene, &ropes, batch))?;
-    let s = summarise(&trials);
+    let fraction = |good: fn(&LobDrapeTrial) -> bool| {
+        mean(trials.iter().map(|t| f64::from(u8::from(good(t)))))
+    };
+    let hit = fraction(|t| t.lob.as_ref().is_some_and(is_target_hit));
+    let hit_and_stay = fraction(|t| t.lob.as_ref().is_some_and(|l| l.verdict.success));
+    let draped = fraction(|t| t.drape.as_ref().is_some_and(|d| d.verdict.success));
+    let draped_m: Vec<f64> = trials
+        .iter()
+        .filter_map(|t| t.drape.as_ref().filter(|d| d.verdict.success))
+        .map(|d| d.error_m)
+        .collect();
+    let midpoint_m = draped_m.iter().sum::<f64>() / draped_m.len() as f64;
     // A rope without a throw never comes near.
     let curve = |name: &str, paper, of: fn(&LobDrapeTrial) -> Option<f64>| {
         let errors_m = trials.iter().map(|t| of(t).unwrap_or(f64::INFINITY));
@@ -215,18 +200,18 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let axis = "distance (cm); dashed: the paper's mean of drapes";
     let picture = experiment.picture(axis, curves)?;
     let own = json!({
-        "ropes": trials.len(), "lob_hit": s.hit, "lob_hit_and_stay": s.hit_and_stay,
-        "draped": s.draped, "midpoint_m": s.midpoint_m, "trials": trials,
+        "ropes": trials.len(), "lob_hit": hit, "lob_hit_and_stay": hit_and_stay,
+        "draped": draped, "midpoint_m": midpoint_m, "trials": trials,
     });
     let summary = format!("{} ropes", trials.len());
     experiment.finish(&summary, picture, own, || {
         print_table(&trials, 0, TABLE);
         println!(
             "\nlob: {:.0} % hit (paper 54), {:.0} % hit and stay (paper 21); drape: {:.0} % (paper 63), midpoint {:.1} cm over those (paper 4.6)",
-            100.0 * s.hit,
-            100.0 * s.hit_and_stay,
-            100.0 * s.draped,
-            100.0 * s.midpoint_m
+            100.0 * hit,
+            100.0 * hit_and_stay,
+            100.0 * draped,
+            100.0 * midpoint_m
         );
     })
 }

@@ -47,16 +47,6 @@ impl Curve {
     }
 }
 
-/// A picture of several curves over one axis of powers of ten.
-pub(super) struct Picture<'a> {
-    pub name: &'a str,
-    /// What is along the axis, with its unit.
-    pub axis: &'a str,
-    pub seed: u64,
-    /// Curves; colours repeat beyond nine.
-    pub curves: Vec<Curve>,
-}
-
 /// Where the picture of a result file stands: `.svg` for `.json`, or after its name.
 pub(super) fn beside(result: &Path) -> PathBuf {
     match result.extension() {
@@ -65,90 +55,95 @@ pub(super) fn beside(result: &Path) -> PathBuf {
     }
 }
 
-impl Picture<'_> {
-    /// Draws next to the result file; nothing where there is none.
-    pub(super) fn write(&self, out: Option<&Path>) -> Outcome<Option<PathBuf>> {
-        let Some(path) = out.map(beside) else {
-            return Ok(None);
-        };
-        let mut svg = String::new();
-        self.draw(&mut svg)
-            .map_err(|e| anyhow!("picture `{}`: {e}", path.display()))
-            .or_failed()?;
-        files::write_atomic(&path, svg.as_bytes()).or_failed()?;
-        Ok(Some(path))
-    }
+/// Draws the curves of a result of this name and seed over one axis of powers of ten, next
+/// to the result file; nothing where there is none. `axis` is what is along it, with its
+/// unit. Colours repeat beyond nine curves.
+pub(super) fn write(
+    out: Option<&Path>,
+    (name, seed): (&str, u64),
+    axis: &str,
+    curves: &[Curve],
+) -> Outcome<Option<PathBuf>> {
+    let Some(path) = out.map(beside) else {
+        return Ok(None);
+    };
+    let title = format!("{name}, seed {seed}, version {VERSION}");
+    let mut svg = String::new();
+    draw(&mut svg, &title, axis, curves)
+        .map_err(|e| anyhow!("picture `{}`: {e}", path.display()))
+        .or_failed()?;
+    files::write_atomic(&path, svg.as_bytes()).or_failed()?;
+    Ok(Some(path))
+}
 
-    /// Smallest and greatest value shown: whole powers of ten around the middle 98 %.
-    fn range(&self) -> (f64, f64) {
-        let finite = |v: &f64| v.is_finite() && *v > 0.0;
-        let values = self
-            .curves
-            .iter()
-            .flat_map(|c| c.values.iter().chain(&c.paper));
-        let mut sorted: Vec<f64> = values.copied().filter(finite).collect();
-        sorted.sort_by(f64::total_cmp);
-        let low = sorted.get(sorted.len() / 100).copied().unwrap_or(0.1);
-        let high = sorted.last().copied().unwrap_or(10.0);
-        let decade = |v: f64, up: bool| {
-            let power = v.log10();
-            10f64.powf(if up { power.ceil() } else { power.floor() })
-        };
-        let low = decade(low, false);
-        (low, decade(high, true).max(10.0 * low))
-    }
+/// Smallest and greatest value shown: whole powers of ten around the middle 98 %.
+fn range(curves: &[Curve]) -> (f64, f64) {
+    let finite = |v: &f64| v.is_finite() && *v > 0.0;
+    let values = curves.iter().flat_map(|c| c.values.iter().chain(&c.paper));
+    let mut sorted: Vec<f64> = values.copied().filter(finite).collect();
+    sorted.sort_by(f64::total_cmp);
+    let low = sorted.get(sorted.len() / 100).copied().unwrap_or(0.1);
+    let high = sorted.last().copied().unwrap_or(10.0);
+    let decade = |v: f64, up: bool| {
+        let power = v.log10();
+        10f64.powf(if up { power.ceil() } else { power.floor() })
+    };
+    let low = decade(low, false);
+    (low, decade(high, true).max(10.0 * low))
+}
 
-    fn draw(&self, svg: &mut String) -> Result<(), Box<dyn core::error::Error>> {
-        let (low, high) = self.range();
-        let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
-        area.fill(&WHITE)?;
-        let title = format!("{}, seed {}, version {VERSION}", self.name, self.seed);
-        let mut chart = ChartBuilder::on(&area)
-            .margin(16)
-            .caption(title, ("sans-serif", 18))
-            .x_label_area_size(44)
-            .y_label_area_size(56)
-            .build_cartesian_2d((low..high).log_scale(), 0.0..100.0)?;
+fn draw(
+    svg: &mut String,
+    title: &str,
+    axis: &str,
+    curves: &[Curve],
+) -> Result<(), Box<dyn core::error::Error>> {
+    let (low, high) = range(curves);
+    let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&area)
+        .margin(16)
+        .caption(title, ("sans-serif", 18))
+        .x_label_area_size(44)
+        .y_label_area_size(56)
+        .build_cartesian_2d((low..high).log_scale(), 0.0..100.0)?;
+    chart
+        .configure_mesh()
+        .x_desc(axis)
+        .y_desc("fraction of the trials below (%)")
+        .x_label_formatter(&|v| format!("{v}"))
+        .draw()?;
+    for (curve, colour) in curves.iter().zip(COLOURS.iter().cycle()) {
         chart
-            .configure_mesh()
-            .x_desc(self.axis)
-            .y_desc("fraction of the trials below (%)")
-            .x_label_formatter(&|v| format!("{v}"))
-            .draw()?;
-        for (curve, colour) in self.curves.iter().zip(COLOURS.iter().cycle()) {
-            chart
-                .draw_series(LineSeries::new(
-                    steps(&curve.values, low, high),
-                    colour.stroke_width(2),
-                ))?
-                .label(curve.name.clone())
-                .legend(move |(x, y)| {
-                    PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2))
-                });
-            if let Some(paper) = curve.paper {
-                chart.draw_series(DashedLineSeries::new(
-                    [(paper, 0.0), (paper, 100.0)],
-                    5,
-                    4,
-                    colour.stroke_width(1),
-                ))?;
-            }
+            .draw_series(LineSeries::new(
+                steps(&curve.values, low, high),
+                colour.stroke_width(2),
+            ))?
+            .label(curve.name.clone())
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
+        if let Some(paper) = curve.paper {
+            chart.draw_series(DashedLineSeries::new(
+                [(paper, 0.0), (paper, 100.0)],
+                5,
+                4,
+                colour.stroke_width(1),
+            ))?;
         }
-        if self.curves.iter().any(|c| c.paper.is_some()) {
-            chart
-                .draw_series(core::iter::empty::<PathElement<(f64, f64)>>())?
-                .label("dashed: the paper's")
-                .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], WHITE));
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .background_style(WHITE.mix(0.8))
-            .border_style(BLACK.mix(0.3))
-            .draw()?;
-        area.present()?;
-        Ok(())
     }
+    if curves.iter().any(|c| c.paper.is_some()) {
+        chart
+            .draw_series(core::iter::empty::<PathElement<(f64, f64)>>())?
+            .label("dashed: the paper's")
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], WHITE));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.3))
+        .draw()?;
+    area.present()?;
+    Ok(())
 }
 
 /// The distribution of the values as stairs (%), between two limits.
@@ -183,27 +178,24 @@ mod tests {
     #[test]
     fn a_picture_stands_beside_its_result_with_seed_and_names() {
         let dir = tempfile::tempdir().unwrap();
-        let picture = Picture {
-            name: "sim-pipeline",
-            axis: "distance of tip and target (cm)",
-            seed: 7,
-            curves: vec![
-                Curve {
-                    name: "true <parameters>".to_owned(),
-                    values: vec![0.02, 0.3, f64::NAN],
-                    paper: Some(1.2),
-                },
-                Curve {
-                    name: "nothing".to_owned(),
-                    values: Vec::new(),
-                    paper: None,
-                },
-            ],
-        };
-        assert_eq!(picture.range(), (0.01, 10.0));
-        assert_eq!(picture.write(None).unwrap(), None);
+        let curves = [
+            Curve {
+                name: "true <parameters>".to_owned(),
+                values: vec![0.02, 0.3, f64::NAN],
+                paper: Some(1.2),
+            },
+            Curve {
+                name: "nothing".to_owned(),
+                values: Vec::new(),
+                paper: None,
+            },
+        ];
+        let axis = "distance of tip and target (cm)";
+        let drawn = |out: Option<&Path>| write(out, ("sim-pipeline", 7), axis, &curves).unwrap();
+        assert_eq!(range(&curves), (0.01, 10.0));
+        assert_eq!(drawn(None), None);
         let out = dir.path().join("result.json");
-        let path = picture.write(Some(&out)).unwrap().unwrap();
+        let path = drawn(Some(&out)).unwrap();
         let svg = std::fs::read_to_string(&path).unwrap();
         assert_eq!(path, dir.path().join("result.svg"));
         for wanted in [

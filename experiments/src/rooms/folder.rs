@@ -104,10 +104,5 @@ pub(super) fn write(folder: &Path, seed: u64, kind: Kind) -> anyhow::Result<Scen
 /// The scene in a folder, if its film is whole.
 pub(super) fn scene(folder: &Path) -> anyhow::Result<Option<Scene>> {
     let path = folder.join("scene.json");
-    if !path.exists() {
-        return Ok(None);
-    }
-    let text = files::read_text(&path)?;
-    let scene = serde_json::from_str(&text).with_context(|| format!("`{}`", path.display()))?;
-    Ok(Some(scene))
+    path.exists().then(|| files::read_json(&path)).transpose()
 }

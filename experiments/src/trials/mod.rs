@@ -69,10 +69,8 @@ pub struct Trial {
 }
 
 impl TrialRig {
-    /// The wiggle of the configuration, filmed from the side with the paper's noise.
-    ///
-    /// # Errors
-    /// If the arm may not execute it.
+    /// The wiggle of the configuration, which the arm must be able to execute, filmed from
+    /// the side with the paper's noise.
     pub fn new(config: &WiggleConfig) -> Result<Self, WiggleError> {
         Ok(Self {
             motion: wiggling_arm(config)?,
@@ -84,9 +82,6 @@ impl TrialRig {
     }
 
     /// Films a rope with the errors of recording `index` of `seed`.
-    ///
-    /// # Errors
-    /// What the simulator refuses.
     pub fn film(&self, rope: &RopeParams, seed: u64, index: u64) -> Result<Filmed, SimulateError> {
         let noise = self.randomisation.draw(seed ^ TRIAL_SALT, index);
         let timing = FilmTiming::default();
@@ -111,9 +106,6 @@ impl TrialRig {
     }
 
     /// Identifies the rope of a film.
-    ///
-    /// # Errors
-    /// What identification refuses.
     pub fn fit(
         &self,
         filmed: &Filmed,
@@ -137,23 +129,6 @@ impl TrialRig {
         let network = self.network.as_deref();
         let go_on = &mut |_| ControlFlow::Continue(());
         planner::identify(&observation, &options, network, go_on)
-    }
-}
-
-impl Trial {
-    /// A trial from a rope and what was found.
-    fn new(index: u64, truth: &RopeParams, found: &RopeEstimate) -> Self {
-        Self {
-            index,
-            truth: truth.to_array(),
-            found: found.params.to_array(),
-            interval_90: found.posterior.interval_90,
-            residual_px: found.residual_px,
-            out_of_distribution: found.out_of_distribution.score,
-            outside: found.out_of_distribution.is_outside(),
-            method: found.method.to_string(),
-            simulations: found.simulations,
-        }
     }
 }
 
@@ -181,10 +156,7 @@ pub fn in_parallel<T: Send>(
     results.into_iter().flatten().collect()
 }
 
-/// Films and identifies the ropes with these indices.
-///
-/// # Errors
-/// The first trial that cannot be made.
+/// Films and identifies the ropes with these indices; fails as [`in_parallel`] does.
 pub fn run(
     rig: &TrialRig,
     rope: impl Fn(u64) -> RopeParams + Sync,
@@ -195,7 +167,17 @@ pub fn run(
         let truth = rope(index);
         let filmed = rig.film(&truth, options.seed, index)?;
         let found = rig.fit(&filmed, index, &alone(options))?;
-        Ok(Trial::new(index, &truth, &found))
+        Ok(Trial {
+            index,
+            truth: truth.to_array(),
+            found: found.params.to_array(),
+            interval_90: found.posterior.interval_90,
+            residual_px: found.residual_px,
+            out_of_distribution: found.out_of_distribution.score,
+            outside: found.out_of_distribution.is_outside(),
+            method: found.method.to_string(),
+            simulations: found.simulations,
+        })
     })
 }
 

@@ -8,7 +8,7 @@
 use serde_json::Value;
 use std::process::{Command, Output};
 
-pub fn experiments(line: &str) -> Output {
+fn experiments(line: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_experiments"));
     command.args(line.split_whitespace()).output().unwrap()
 }
@@ -21,16 +21,10 @@ pub fn report(line: &str) -> Value {
     serde_json::from_slice(&output.stdout).expect("standard output is JSON")
 }
 
-/// Asserts that a line is refused as bad input, in these words: in the one JSON object of
-/// `--json`, else on standard error.
+/// Asserts that a line is refused as bad input, in these words on standard error.
 pub fn assert_refused(line: &str, words: &[&str]) {
     let output = experiments(line);
-    let said = if line.contains("--json") {
-        let reported: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
-        reported.to_string()
-    } else {
-        String::from_utf8_lossy(&output.stderr).into_owned()
-    };
+    let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{line}: {said}");
     for word in words {
         assert!(said.contains(word), "{line}: {said} lacks {word}");

@@ -10,10 +10,6 @@ use std::path::Path;
 /// Tables of an identified rope beside its parameters.
 const BESIDE: [&str; 4] = ["uncertainty", "interval_90", "fit", "posterior"];
 
-fn read_table(path: &Path) -> Result<toml::Table> {
-    read_toml(path, "rope file")
-}
-
 /// Reads the nine parameters; the tables of an identified rope are allowed and left
 /// alone, any other unknown key is refused.
 pub fn read_rope(path: &Path) -> Result<RopeParams> {
@@ -46,7 +42,7 @@ pub fn read_posterior(path: &Path) -> Result<Option<RopePosterior>> {
 /// Reads why the track that the rope was identified from should not be relied on; empty
 /// where it may be, and for a rope that was not identified.
 pub fn read_doubts(path: &Path) -> Result<Vec<String>> {
-    let table = read_table(path)?;
+    let table: toml::Table = read_toml(path, "rope file")?;
     let doubts = table.get("fit").and_then(|fit| fit.get("doubts")).cloned();
     doubts
         .map_or(Ok(Vec::new()), toml::Value::try_into)

@@ -17,9 +17,7 @@ fn or_dash<T>(value: Option<T>, show: impl Fn(T) -> String) -> String {
 fn result(entry: &Entry) -> String {
     match (entry.result, &entry.stopped_by) {
         (RunResult::Failed, Some(code)) => format!("stopped: {code}"),
-        (RunResult::Ok, _) => "ok".to_owned(),
-        (RunResult::Failed, None) => "failed".to_owned(),
-        (RunResult::Broken, _) => "broken".to_owned(),
+        (result, _) => format!("{result:?}").to_lowercase(),
     }
 }
 

@@ -7,7 +7,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Later steps of the wall clock do not matter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clock {
-    ahead_ns: u64,
+    /// Wall clock minus CLOCK_MONOTONIC (ns).
+    pub(super) ahead_ns: u64,
 }
 
 impl Clock {
@@ -18,11 +19,6 @@ impl Clock {
         Self {
             ahead_ns: wall_ns.saturating_sub(now_ns()),
         }
-    }
-
-    /// Wall clock minus CLOCK_MONOTONIC (ns).
-    pub(super) const fn ahead_ns(self) -> u64 {
-        self.ahead_ns
     }
 
     /// Wall time of an instant of CLOCK_MONOTONIC (ns).

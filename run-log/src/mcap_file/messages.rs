@@ -62,25 +62,13 @@ pub(super) fn commanded(at_ns: u64, cycle: &CycleRecord) -> Value {
     joints(at_ns, &cycle.q_c, None)
 }
 
-/// A mode as the file's messages name it.
-pub(crate) const fn mode_name(mode: ControllerMode) -> &'static str {
-    match mode {
-        ControllerMode::Offline => "Offline",
-        ControllerMode::Idle => "Idle",
-        ControllerMode::Moving => "Moving",
-        ControllerMode::Streaming => "Streaming",
-        ControllerMode::Braking => "Braking",
-        ControllerMode::Faulted => "Faulted",
-    }
-}
-
 /// Figures of a cycle.
 pub(super) fn cycle(at_ns: u64, c: &CycleRecord) -> Value {
     let us = |ns: u32| f64::from(ns) / 1e3;
     let mut message = json!({
         "timestamp": time(at_ns),
         "cycle": c.cycle,
-        "mode": mode_name(ControllerMode::from_raw(c.mode)),
+        "mode": format!("{:?}", ControllerMode::from_raw(c.mode)),
         "fault": format!("{:?}", FaultCode::from_raw(c.fault).unwrap_or_default()),
         "sent": c.sent != 0,
         "wake_late_us": us(c.wake_late_ns),

@@ -25,7 +25,6 @@ pub use channel::Channel;
 pub use counts::RecordingCounts;
 pub use film::{RunFilm, RunPart};
 pub use image::left_jpeg;
-pub(crate) use messages::mode_name;
 pub(crate) use read::{is_mcap, replay_bytes};
 pub use recorder::{Recorded, RecorderConfig, run as record};
 pub use recover::{Recovered, recover};

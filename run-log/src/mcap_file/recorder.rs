@@ -154,7 +154,7 @@ impl Recording {
             &[
                 ("version", shared_types::VERSION.to_owned()),
                 ("domain", config.domain.clone()),
-                ("wall_minus_monotonic_ns", clock.ahead_ns().to_string()),
+                ("wall_minus_monotonic_ns", clock.ahead_ns.to_string()),
                 ("pictures_hz", config.pictures_hz.to_string()),
             ],
         )?;
@@ -346,10 +346,7 @@ pub fn run(config: &RecorderConfig, simulate: SimulateRope, stop: &AtomicBool) -
     listen(config, stop)?.finish(simulate)
 }
 
-/// Records until `stop` is set.
-///
-/// # Errors
-/// Shared memory cannot be joined, or the disk takes nothing any more.
+/// Records until `stop` is set; fails as [`run`] does.
 pub(super) fn listen(config: &RecorderConfig, stop: &AtomicBool) -> Result<Recorded> {
     if let Err(reason) = rustix::process::nice(NICE) {
         tracing::warn!(%reason, "the recorder runs with ordinary priority");

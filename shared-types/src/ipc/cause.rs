@@ -1,6 +1,5 @@
 //! Why the arm was stopped: one record per stop.
 
-use super::payload::ControllerMode;
 use crate::fault::FaultCode;
 #[cfg(feature = "std")]
 use iceoryx2::prelude::ZeroCopySend;
@@ -64,7 +63,7 @@ pub struct CauseRecord {
     pub arm_error: u8,
     /// The arm's own warning code as far as known, 0 for none.
     pub arm_warning: u8,
-    /// Mode when it was noticed, raw [`ControllerMode`].
+    /// Mode when it was noticed, raw [`super::ControllerMode`].
     pub mode: u8,
     /// How it was met: 0 refused or counted, 1 slowed along the path, 2 braked
     /// in joint space, 3 no setpoints any more.
@@ -98,11 +97,5 @@ impl CauseRecord {
     #[must_use]
     pub fn fault(&self) -> FaultCode {
         FaultCode::from_raw(self.code).unwrap_or_default()
-    }
-
-    /// Mode when it was noticed.
-    #[must_use]
-    pub fn mode_then(&self) -> ControllerMode {
-        ControllerMode::from_raw(self.mode)
     }
 }

@@ -47,9 +47,7 @@ fn own_folder(folder: &Path, user: u32) -> Result<(), IpcError> {
 pub(super) fn config_of(domain: &str) -> Result<Config, IpcError> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if domain.is_empty() || domain.len() > 40 || !domain.chars().all(plain) {
-        return Err(IpcError::Domain {
-            domain: domain.to_owned(),
-        });
+        return Err(IpcError::Domain(domain.to_owned()));
     }
     let root = root_folder()?;
     let fail = |e: SemanticStringError| IpcError::join(domain, &root, e);

@@ -7,11 +7,8 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum IpcError {
     /// The domain name cannot be part of a file name.
-    #[error("shared-memory domain `{domain}` must be 1 to 40 letters, digits, `-` or `_`")]
-    Domain {
-        /// Name given.
-        domain: String,
-    },
+    #[error("shared-memory domain `{0}` must be 1 to 40 letters, digits, `-` or `_`")]
+    Domain(String),
     /// Shared memory cannot be joined, a message not be sent or received, or nobody answered
     /// in time.
     #[error("{0}")]

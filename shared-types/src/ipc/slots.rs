@@ -112,15 +112,9 @@ impl<T: Board> BoardReader<T> {
     /// The value written last. RT-safe.
     #[must_use]
     pub fn get(&self) -> T {
-        let mut values = self.entries.iter().map(|entry| *entry.get());
-        let first = values.next().unwrap_or_default();
-        values.fold(first, |newest, value| {
-            if value.count() > newest.count() {
-                value
-            } else {
-                newest
-            }
-        })
+        let values = self.entries.iter().map(|entry| *entry.get());
+        let newer = |a: T, b: T| if b.count() > a.count() { b } else { a };
+        values.reduce(newer).unwrap_or_default()
     }
 }
 

@@ -3,6 +3,7 @@
 use super::Extent;
 use super::workload::{Workload, throw_options, timed};
 use crate::report::Column;
+use cli_output::Machine;
 use rope_sim::{
     Candidate, FrameTimes, Kernel, Outcome, Precision, Scene, SimOptions, SimulateError, Watch,
 };
@@ -91,17 +92,13 @@ pub fn measure(
     Ok(rows)
 }
 
-fn threads() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
-
 /// What planning one throw takes: 25 generations of 60 candidates.
 fn throw_job(workload: &Workload, extent: Extent) -> Job<'_> {
     let whole = 1500;
     Job {
         name: "throw",
         candidates: workload.throwing(extent.share(whole)),
-        options: throw_options(1.5, threads()),
+        options: throw_options(1.5, Machine::here().cores),
         whole,
         limit_cpu_s: 1.0,
     }
@@ -118,7 +115,7 @@ fn wiggle_job(workload: &Workload, extent: Extent) -> Job<'_> {
             count: 400,
         },
         watch: Watch::NOTHING,
-        ..throw_options(6.67, threads())
+        ..throw_options(6.67, Machine::here().cores)
     };
     Job {
         name: "wiggle",

@@ -7,11 +7,9 @@ mod scaling;
 mod workload;
 
 use crate::args::BenchArgs;
-use crate::bench::report::report;
-use crate::report::print_table;
+use crate::report::{print_table, report};
 use cli_output::{OrInput, Outcome, Stage};
-use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use workload::{LINKS, Workload};
 
 /// How much is measured.
@@ -35,15 +33,6 @@ impl Extent {
     }
 }
 
-#[derive(Debug, Serialize)]
-struct Report {
-    repeats: usize,
-    kernels: Vec<kernels::KernelRow>,
-    jobs: Vec<jobs::JobRow>,
-    links: scaling::LinkScaling,
-    candidates: Vec<scaling::CandidateRow>,
-}
-
 pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     let extent = Extent::of(args.quick);
     let workload = Workload::new(args.seed).or_failed()?;
@@ -61,14 +50,10 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
         links.rows.len(),
         candidates.len()
     ));
-    let measured = Report {
-        repeats: extent.repeats,
-        kernels,
-        jobs,
-        links,
-        candidates,
-    };
-    let own = serde_json::to_value(&measured).or_failed()?;
+    let own = json!({
+        "repeats": extent.repeats, "kernels": kernels, "jobs": jobs, "links": links,
+        "candidates": candidates,
+    });
     Ok(report(args, "bench rope", own, || {
         let rough = if args.quick {
             "; quick: few candidates, rough figures"
@@ -79,23 +64,17 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
             "seed {}, least processor time of {}{rough}",
             args.seed, extent.repeats
         );
-        measured.print();
-    }))
-}
-
-impl Report {
-    fn print(&self) {
         println!("\nOne thread, {LINKS} links, processor time per rope-step:");
-        print_table(&self.kernels, 0, kernels::TABLE);
+        print_table(&kernels, 0, kernels::TABLE);
         println!("\nJobs on all cores:");
-        print_table(&self.jobs, 2, jobs::TABLE);
+        print_table(&jobs, 2, jobs::TABLE);
         println!("\nCost against links, one thread:");
-        print_table(&self.links.rows, 0, scaling::LINKS_TABLE);
+        print_table(&links.rows, 0, scaling::LINKS_TABLE);
         println!(
             "line: {:.2} ns per link-step + {:.0} ns, R² = {:.5}",
-            self.links.slope_ns_per_link_step, self.links.intercept_ns, self.links.r_squared
+            links.slope_ns_per_link_step, links.intercept_ns, links.r_squared
         );
         println!("\nCost against candidates, one thread, arm spline each:");
-        print_table(&self.candidates, 0, scaling::CANDIDATES_TABLE);
-    }
+        print_table(&candidates, 0, scaling::CANDIDATES_TABLE);
+    }))
 }
