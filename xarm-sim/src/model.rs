@@ -15,7 +15,7 @@ use super::pacer::Pacer;
 use super::reference::{Move, Reference, Task};
 use super::servo::ServoStream;
 use super::setpoint_check::SetpointLimits;
-use arm_model::{JOINTS, JointState, JointVector, Limits};
+use arm_model::{JOINTS, JointState, JointVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::xarm::{
@@ -244,10 +244,6 @@ impl ArmModel {
             qd: self.reference.qd,
             qdd: self.reference.qdd,
         }
-    }
-
-    pub(super) fn limits(&self) -> &Limits {
-        &self.config.limits
     }
 
     /// State as register 13 and the reports give it.
