@@ -59,7 +59,7 @@ mod warning {
 }
 
 /// A velocity command.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct VelocityCommand {
     qd: JointVector,
     synchronised: bool,

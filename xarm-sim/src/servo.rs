@@ -23,7 +23,7 @@ const SILENCE_S: f64 = 1.0 / 30.0;
 /// Intervals over which the rate of the stream is averaged.
 const INTERVALS: usize = 25;
 /// A setpoint to execute.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Setpoint {
     pub(super) at: MonotonicNs,
     pub(super) q: JointVector,
