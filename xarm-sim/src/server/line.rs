@@ -52,17 +52,11 @@ impl Line {
     /// Bytes taken by the socket without waiting, 0 when it is full.
     fn send_some(&self, bytes: &[u8]) -> io::Result<usize> {
         let socket = SockRef::from(&self.stream);
-        match socket.send_with_flags(bytes, MSG_DONTWAIT | MSG_NOSIGNAL) {
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
-                ) =>
-            {
-                Ok(0)
-            }
-            sent => sent,
-        }
+        let sent = socket.send_with_flags(bytes, MSG_DONTWAIT | MSG_NOSIGNAL);
+        sent.or_else(|error| match error.kind() {
+            io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(0),
+            _ => Err(error),
+        })
     }
 
     /// Ends the connection in order or by a reset, and wakes its reader.
