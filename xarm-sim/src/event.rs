@@ -75,6 +75,4 @@ pub struct ArmCounters {
     /// Motion commands that came while the arm could not move or was in another
     /// mode.
     pub ignored: u64,
-    /// Other requests.
-    pub requests: u64,
 }

@@ -16,6 +16,11 @@ pub struct JointSample {
     pub state: JointState,
 }
 
+/// A panic elsewhere leaves whole values behind.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Something that a [`History`] keeps.
 pub trait Timed: Copy {
     /// How many are kept.
@@ -59,13 +64,8 @@ impl<T> Default for History<T> {
 }
 
 impl<T: Timed> History<T> {
-    fn kept(&self) -> MutexGuard<'_, VecDeque<T>> {
-        // A panic elsewhere leaves whole values behind.
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     pub(super) fn extend(&self, new: impl IntoIterator<Item = T>) {
-        let mut kept = self.kept();
+        let mut kept = lock(&self.kept);
         kept.extend(new);
         let surplus = kept.len().saturating_sub(T::KEPT);
         kept.drain(..surplus);
@@ -74,14 +74,14 @@ impl<T: Timed> History<T> {
     /// The newest, `None` before the first.
     #[must_use]
     pub fn latest(&self) -> Option<T> {
-        self.kept().back().copied()
+        lock(&self.kept).back().copied()
     }
 
     /// What was later than `after`. Calling it again with the time of the last one gives
     /// every one once, as long as it is still kept.
     #[must_use]
     pub fn since(&self, after: MonotonicNs) -> Vec<T> {
-        let kept = self.kept();
+        let kept = lock(&self.kept);
         kept.iter().filter(|it| it.at() > after).copied().collect()
     }
 }

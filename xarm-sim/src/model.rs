@@ -10,13 +10,12 @@ use super::config::ArmConfig;
 use super::controller_clock::ControllerClock;
 use super::event::{ArmCounters, ArmEvent, TimedEvent};
 use super::feedback::{Feedback, FeedbackKind};
-use super::history::JointSample;
 use super::joint::JointDynamics;
 use super::pacer::Pacer;
 use super::reference::{Move, Reference, Task};
 use super::servo::ServoStream;
 use super::setpoint_check::SetpointLimits;
-use arm_model::{JOINTS, JointState, JointVector, Limits};
+use arm_model::{JOINTS, JointState, JointVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rt_controller::xarm::{
@@ -60,7 +59,7 @@ mod warning {
 }
 
 /// A velocity command.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct VelocityCommand {
     qd: JointVector,
     synchronised: bool,
@@ -245,10 +244,6 @@ impl ArmModel {
             qd: self.reference.qd,
             qdd: self.reference.qdd,
         }
-    }
-
-    pub(super) fn limits(&self) -> &Limits {
-        &self.config.limits
     }
 
     /// State as register 13 and the reports give it.

@@ -20,7 +20,7 @@ pub enum Intake {
 }
 
 /// Keeps the newest command until its turn.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Pacer<T> {
     waiting: Option<(MonotonicNs, T)>,
     /// When the next command may be taken.
@@ -29,17 +29,6 @@ pub(super) struct Pacer<T> {
     pub(super) dropped: u64,
     /// Cycles of the grid that found no new command.
     pub(super) repeated: u64,
-}
-
-impl<T> Default for Pacer<T> {
-    fn default() -> Self {
-        Self {
-            waiting: None,
-            due: MonotonicNs(0),
-            dropped: 0,
-            repeated: 0,
-        }
-    }
 }
 
 impl<T: Copy> Pacer<T> {

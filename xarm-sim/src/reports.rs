@@ -166,7 +166,7 @@ fn rich(model: &ArmModel, version: Firmware, counter: u32) -> RichReport {
         tcp_speed_max_m_s: 1.0,
         joint_jerk_rad_s3: settings.joint_jerk_rad_s3,
         joint_acceleration_max_rad_s2: settings.joint_acceleration_rad_s2,
-        joint_speed_max_rad_s: model.limits().velocity_max_rad_s[0],
+        joint_speed_max_rad_s: model.config().limits.velocity_max_rad_s[0],
         servo_error: model.servo_error,
         temperature_c: [25; JOINTS],
         target_tcp_speed_m_s: twist.position().norm(),

@@ -23,7 +23,7 @@ const SILENCE_S: f64 = 1.0 / 30.0;
 /// Intervals over which the rate of the stream is averaged.
 const INTERVALS: usize = 25;
 /// A setpoint to execute.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Setpoint {
     pub(super) at: MonotonicNs,
     pub(super) q: JointVector,
@@ -134,20 +134,8 @@ impl ServoStream {
 mod tests {
     use super::*;
     use arm_model::Limits;
-    use nalgebra::Vector3;
 
     const MS: u64 = 1_000_000;
-
-    fn checks(joints: &Limits) -> SetpointLimits<'_> {
-        SetpointLimits {
-            joints,
-            tcp_offset: Vector3::zeros(),
-            tcp_speed_max_m_s: 1.2,
-            tcp_speed_code: ErrorCode::TCP_SPEED_LIMIT,
-            self_collision: false,
-            fence_m: None,
-        }
-    }
 
     fn take(servo: &mut ServoStream, now: MonotonicNs) -> Option<Setpoint> {
         servo.take(now, CYCLE_S, Intake::Arrival)
@@ -157,7 +145,7 @@ mod tests {
     /// Returns the first error.
     fn stream(speed_rad_s: f64, late_ms: impl Fn(u64) -> u64) -> (Option<ErrorCode>, usize) {
         let limits = Limits::default();
-        let checks = checks(&limits);
+        let checks = SetpointLimits::of_joints(&limits);
         let mut servo = ServoStream::default();
         let mut q = JointVector::ZERO;
         let mut taken = 0;
@@ -200,7 +188,7 @@ mod tests {
     #[test]
     fn setpoints_of_one_read_count_from_the_one_before_them() {
         let limits = Limits::default();
-        let checks = checks(&limits);
+        let checks = SetpointLimits::of_joints(&limits);
         let send = |speed_rad_s: f64| {
             let mut servo = ServoStream::default();
             let mut offer = |arrived_ms: u64, path_ms: u64| {
@@ -232,7 +220,7 @@ mod tests {
     #[test]
     fn only_the_newest_of_a_burst_is_taken() {
         let limits = Limits::default();
-        let checks = checks(&limits);
+        let checks = SetpointLimits::of_joints(&limits);
         let mut servo = ServoStream::default();
         let mut taken = Vec::new();
         for k in 0..1000_u64 {

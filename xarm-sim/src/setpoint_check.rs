@@ -104,6 +104,21 @@ fn tool_position(q: &JointVector, offset: &Vector3<f64>) -> Vector3<f64> {
 }
 
 #[cfg(test)]
+impl<'a> SetpointLimits<'a> {
+    /// Joints, and 1.2 m/s of the bare flange; neither self collision nor a boundary.
+    pub(super) fn of_joints(joints: &'a Limits) -> Self {
+        Self {
+            joints,
+            tcp_offset: Vector3::zeros(),
+            tcp_speed_max_m_s: 1.2,
+            tcp_speed_code: ErrorCode::TCP_SPEED_LIMIT,
+            self_collision: false,
+            fence_m: None,
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
@@ -112,14 +127,7 @@ mod tests {
         let limits = Limits::default();
         let mut folded = JointVector::ZERO;
         folded[5] = 3.1;
-        let mut checks = SetpointLimits {
-            joints: &limits,
-            tcp_offset: Vector3::zeros(),
-            tcp_speed_max_m_s: 1.2,
-            tcp_speed_code: ErrorCode::TCP_SPEED_LIMIT,
-            self_collision: false,
-            fence_m: None,
-        };
+        let mut checks = SetpointLimits::of_joints(&limits);
         assert_eq!(checks.check_pose(&folded), Ok(()));
         checks.self_collision = true;
         assert_eq!(checks.check_pose(&folded), Err(ErrorCode::SELF_COLLISION));

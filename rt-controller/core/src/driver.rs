@@ -95,10 +95,7 @@ impl<T: ArmTransport> CycleDriver<T> {
             link: None,
             link_lost: false,
             held: StaleSetpointDrop::default(),
-            next: Wake {
-                deadline_ns: 0,
-                missed: 0,
-            },
+            next: Wake::default(),
             period_ns: MonotonicNs(0).plus_s(control.period_s()).0,
             control,
         };

@@ -72,7 +72,7 @@ impl StaleSetpointDrop {
 }
 
 /// When a cycle runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Wake {
     /// Its planned instant (ns).
     pub deadline_ns: u64,

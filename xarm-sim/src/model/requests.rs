@@ -122,7 +122,6 @@ impl ArmModel {
     fn refuse(&mut self, error: &CommandError, parameters: &[u8]) -> Answer {
         let code = match error {
             CommandError::Untyped(register) => {
-                self.counters.requests += 1;
                 self.log(ArmEvent::Request {
                     register: register.code(),
                 });
@@ -172,11 +171,7 @@ impl ArmModel {
 
     /// Executes a command that arrived at `at`.
     pub fn command(&mut self, at: MonotonicNs, command: &Command) -> Answer {
-        if !matches!(
-            command,
-            Command::ServoJoint(_) | Command::JointVelocity { .. }
-        ) {
-            self.counters.requests += 1;
+        if !command.is_setpoint() {
             self.log(ArmEvent::Request {
                 register: command.register().code(),
             });

@@ -106,12 +106,10 @@ impl Settings {
             Register::ReportEffort => self.reports_current = flag()?,
             Register::SetReducedMode => self.reduced.on = flag()?,
             Register::ReducedTcpSpeed => {
-                let [speed] = words(parameters)?.map(f32::from_le_bytes);
-                self.reduced.tcp_speed_mm_s = speed;
+                [self.reduced.tcp_speed_mm_s] = words(parameters)?.map(f32::from_le_bytes);
             }
             Register::ReducedJointSpeed => {
-                let [speed] = words(parameters)?.map(f32::from_le_bytes);
-                self.reduced.joint_speed_rad_s = speed;
+                [self.reduced.joint_speed_rad_s] = words(parameters)?.map(f32::from_le_bytes);
             }
             Register::ReducedJointRange => {
                 self.reduced.joint_ranges_rad = words(parameters)?.map(f32::from_le_bytes);

@@ -1,9 +1,10 @@
 //! The sending side of a connection: whole frames, never waiting.
 
+use crate::history::lock;
 use socket2::SockRef;
 use std::io;
 use std::net::{Shutdown, TcpStream};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 use std::time::Duration;
 
 /// Linux: this call does not wait, although the socket is a waiting one (its
@@ -11,11 +12,6 @@ use std::time::Duration;
 const MSG_DONTWAIT: i32 = 0x40;
 /// Linux: a client that is gone is an error, not a signal.
 const MSG_NOSIGNAL: i32 = 0x4000;
-
-/// A panic elsewhere leaves whole values behind.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// A connection, shared by the thread that reads it and those that send.
 #[derive(Debug)]
@@ -56,17 +52,11 @@ impl Line {
     /// Bytes taken by the socket without waiting, 0 when it is full.
     fn send_some(&self, bytes: &[u8]) -> io::Result<usize> {
         let socket = SockRef::from(&self.stream);
-        match socket.send_with_flags(bytes, MSG_DONTWAIT | MSG_NOSIGNAL) {
-            Err(error)
-                if matches!(
-                    error.kind(),
-                    io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted
-                ) =>
-            {
-                Ok(0)
-            }
-            sent => sent,
-        }
+        let sent = socket.send_with_flags(bytes, MSG_DONTWAIT | MSG_NOSIGNAL);
+        sent.or_else(|error| match error.kind() {
+            io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(0),
+            _ => Err(error),
+        })
     }
 
     /// Ends the connection in order or by a reset, and wakes its reader.

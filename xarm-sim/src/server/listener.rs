@@ -99,6 +99,7 @@ fn serve(stream: TcpStream, service: Service, plant: &Arc<Plant>) -> io::Result<
 /// ports say nothing; reading notices that they leave.
 fn read_all(stream: &TcpStream, id: u32, plant: &Plant, line: &super::line::Line) {
     let mut bytes = [0; READ_LEN];
+    let is_closed = || plant.with_endpoint(|endpoint, _| endpoint.closing(id).is_some());
     while !plant.is_stopping() {
         let (received, stamp_ns) = match receive(stream, &mut bytes) {
             Ok((0, _)) => return,
@@ -111,7 +112,7 @@ fn read_all(stream: &TcpStream, id: u32, plant: &Plant, line: &super::line::Line
             plant.with_endpoint(|endpoint, _| endpoint.receive(id, arrival, &bytes[..received]));
         plant.flush(id, line);
         if !listens {
-            while !plant.is_stopping() && !is_closed(id, plant) {
+            while !plant.is_stopping() && !is_closed() {
                 thread::sleep(DEAF_PAUSE);
             }
         }
@@ -126,10 +127,6 @@ fn arrival(stamp_ns: Option<u64>, now: MonotonicNs) -> MonotonicNs {
         .map(|ns| MonotonicNs(ns.min(now.0)))
         .filter(|stamp| now.since_s(*stamp) < STAMP_AGE_MAX_S)
         .unwrap_or(now)
-}
-
-fn is_closed(id: u32, plant: &Plant) -> bool {
-    plant.with_endpoint(|endpoint, _| endpoint.closing(id).is_some())
 }
 
 pub(super) fn join(thread: JoinHandle<()>) {

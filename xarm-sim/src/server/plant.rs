@@ -1,11 +1,11 @@
 //! The endpoint in real time, shared by the threads of the server.
 
-use super::line::{Line, lock};
+use super::line::Line;
 use crate::clock;
 use crate::config::ArmConfig;
 use crate::endpoint::{ArmEndpoint, Closing, ConnectRefused, Service};
 use crate::event::{ArmEvent, TimedEvent};
-use crate::history::{History, JointSample};
+use crate::history::{History, JointSample, lock};
 use crate::model::STEP_S;
 use rt_controller::os::{RealTimeSettings, enter_real_time};
 use shared_types::MonotonicNs;

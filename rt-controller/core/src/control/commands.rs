@@ -112,7 +112,7 @@ impl ControlState {
                 if self.settings.arming_required && shot {
                     self.arming = ArmingState::Spent;
                 }
-                self.monitor.motion_begins();
+                self.monitor.reports.motion_begins();
                 self.state = ModeState::Following(Running {
                     id,
                     start_ns,

@@ -10,6 +10,7 @@ use arm_model::joint::START_POSE;
 use shared_types::ipc::{CauseRecord, GuardianBeat, JointReport, OperatorBeat};
 
 pub(super) const PERIOD_NS: u64 = 4_000_000;
+pub(super) const ENGAGE: ControlCommand = ControlCommand::Engage { hold: START_POSE };
 
 /// A cycle in which all is well: the heartbeats go on and the arm is in `q` (rad).
 pub(super) fn quiet_input(now_ns: u64, count: u64, q: JointVector) -> CycleInput {
@@ -81,7 +82,7 @@ impl Bench {
 
     pub(super) fn holding_with(settings: impl Into<ControlSettings>) -> Self {
         let mut bench = Self::of(settings);
-        bench.command(ControlCommand::Engage { hold: START_POSE });
+        bench.command(ENGAGE);
         bench.cycles(100);
         assert_eq!(bench.state.mode(), ControllerMode::Idle);
         bench.events.clear();
@@ -115,8 +116,29 @@ impl Bench {
     }
 
     pub(super) fn cycle(&mut self) {
-        let input = self.input(0);
+        self.cycle_with(|_| ());
+    }
+
+    /// A cycle whose input `change` has changed.
+    pub(super) fn cycle_with(&mut self, change: impl FnOnce(&mut CycleInput)) {
+        let mut input = self.input(0);
+        change(&mut input);
         self.step(input);
+    }
+
+    /// Cycles that are all spoilt, the first of them with a command.
+    pub(super) fn spoilt_cycles(
+        &mut self,
+        count: usize,
+        mut command: Option<ControlCommand>,
+        spoil: impl Fn(&mut CycleInput),
+    ) {
+        for _ in 0..count {
+            self.cycle_with(|input| {
+                spoil(input);
+                input.command = command.take();
+            });
+        }
     }
 
     pub(super) fn cycles(&mut self, count: usize) {
@@ -124,14 +146,11 @@ impl Bench {
     }
 
     pub(super) fn command(&mut self, command: ControlCommand) {
-        let mut input = self.input(0);
-        input.command = Some(command);
-        self.step(input);
+        self.cycle_with(|input| input.command = Some(command));
     }
 
     pub(super) fn run(&mut self, motion: Motion) {
-        let motion = Box::new(motion);
-        self.command(ControlCommand::Run { id: 7, motion });
+        self.command(run_command(7, motion));
     }
 
     pub(super) fn cycles_until_still(&mut self) -> usize {
@@ -144,11 +163,13 @@ impl Bench {
     }
 
     pub(super) fn latched(&self) -> Option<FaultCode> {
-        self.events.iter().find_map(|event| match event {
-            ControlEvent::Latched(cause) => Some(cause.fault()),
-            _ => None,
-        })
+        cause_in(&self.events).map(|cause| cause.fault())
     }
+}
+
+pub(super) fn run_command(id: u64, motion: Motion) -> ControlCommand {
+    let motion = Box::new(motion);
+    ControlCommand::Run { id, motion }
 }
 
 pub(super) fn swing() -> Motion {

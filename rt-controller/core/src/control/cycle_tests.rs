@@ -1,7 +1,7 @@
 //! Motions, commands and what goes wrong on the way, over whole cycles in virtual time.
 //! How each fault is met is asserted on the simulated rig (`hil-tests/tests/faults`).
 
-use super::bench::{Bench, cause_in, swing};
+use super::bench::{Bench, ENGAGE, cause_in, run_command, swing};
 use super::*;
 use crate::control::Thresholds;
 use crate::control::exchange::ControlCommand;
@@ -22,10 +22,7 @@ fn a_trajectory_is_streamed_at_its_planned_times_also_when_it_begins_late() {
         let mut input = bench.input(0);
         input.late_ns = late_ns;
         let (id, start_ns) = (7, input.deadline_ns);
-        input.command = Some(ControlCommand::Run {
-            id,
-            motion: Box::new(motion.clone()),
-        });
+        input.command = Some(run_command(id, motion.clone()));
         bench.step(input);
         assert_eq!(bench.state.mode(), ControllerMode::Streaming);
         bench.cycles_until_still();
@@ -122,23 +119,11 @@ fn throw(rng: &mut rand_chacha::ChaCha8Rng, limits: &Limits) -> Option<JointTraj
 #[test]
 fn a_guardian_that_is_not_required_may_never_come() {
     let mut bench = Bench::offline();
-    let cycles = |bench: &mut Bench, mut command: Option<ControlCommand>, count: usize| {
-        for _ in 0..count {
-            let mut input = bench.input(0);
-            input.guardian = GuardianBeat::default();
-            input.command = command.take();
-            bench.step(input);
-        }
-    };
-    let engage = ControlCommand::Engage { hold: START_POSE };
-    cycles(&mut bench, Some(engage), 101);
+    let unguarded = |input: &mut CycleInput| input.guardian = GuardianBeat::default();
+    bench.spoilt_cycles(101, Some(ENGAGE), unguarded);
     assert_eq!(bench.state.mode(), ControllerMode::Idle);
-    let run = ControlCommand::Run {
-        id: 7,
-        motion: Box::new(swing()),
-    };
     // The swing takes 300 cycles; two seconds in all are four times the guardian's timeout.
-    cycles(&mut bench, Some(run), 400);
+    bench.spoilt_cycles(400, Some(run_command(7, swing())), unguarded);
     assert_eq!(bench.latched(), None);
     assert_eq!(bench.state.mode(), ControllerMode::Idle);
     let finished = |event: &ControlEvent| matches!(event, ControlEvent::Finished { id: 7, .. });
@@ -163,34 +148,18 @@ fn a_motion_needs_a_guardian_that_reaches_the_arm_and_an_operator() {
         };
         let mut bench = Bench::holding_with(settings);
         bench.command(ControlCommand::Stop);
-        let silence = |bench: &mut Bench, mut command: Option<ControlCommand>, count: usize| {
-            for _ in 0..count {
-                let mut input = bench.input(0);
-                spoil(&mut input);
-                input.command = command.take();
-                bench.step(input);
-            }
-        };
-        silence(&mut bench, None, 200);
-        silence(
-            &mut bench,
-            Some(ControlCommand::Engage { hold: START_POSE }),
-            5,
-        );
+        bench.spoilt_cycles(200, None, spoil);
+        bench.spoilt_cycles(5, Some(ENGAGE), spoil);
         assert_eq!(bench.state.mode(), ControllerMode::Idle);
-        let run = |id| ControlCommand::Run {
-            id,
-            motion: Box::new(swing()),
-        };
-        silence(&mut bench, Some(run(8)), 1);
+        bench.spoilt_cycles(1, Some(run_command(8, swing())), spoil);
         let id = Some(8);
         assert_eq!(
             bench.events.last(),
             Some(&ControlEvent::Refused { id, fault })
         );
-        bench.command(run(9));
+        bench.command(run_command(9, swing()));
         assert_eq!(bench.state.mode(), ControllerMode::Streaming, "{fault:?}");
-        silence(&mut bench, None, 400);
+        bench.spoilt_cycles(400, None, spoil);
         assert_eq!(bench.state.summary().fault, fault as u16);
     }
 }
@@ -201,20 +170,16 @@ fn a_link_that_fails_during_a_brake_is_published_beside_the_first_cause() {
     let mut bench = Bench::holding();
     bench.run(swing());
     bench.cycles(61);
-    let mut released = bench.input(0);
-    released.operator.released = 1;
-    bench.step(released);
+    bench.cycle_with(|input| input.operator.released = 1);
     assert_eq!(bench.state.mode(), ControllerMode::Braking);
     assert_eq!(bench.state.summary().link_failed, 0);
-    let mut lost = bench.input(0);
-    lost.link.lost = true;
-    bench.step(lost);
+    bench.cycle_with(|input| input.link.lost = true);
     let state = bench.state.summary();
     let found = (state.mode, state.fault, state.link_failed);
     let fault = FaultCode::DeadManReleased as u16;
     assert_eq!(found, (ControllerMode::Faulted as u8, fault, 1));
     let mut engage = bench.input(0);
-    engage.command = Some(ControlCommand::Engage { hold: START_POSE });
+    engage.command = Some(ENGAGE);
     bench.state.step(engage);
     assert_eq!(bench.state.summary().link_failed, 0);
 }
@@ -228,7 +193,7 @@ fn without_reports_joint_velocities_hold_nothing_and_the_controller_latches() {
     };
     let mut bench = Bench::of(settings);
     bench.commanded = [START_POSE + JointVector([0.01; 7]); 3];
-    bench.command(ControlCommand::Engage { hold: START_POSE });
+    bench.command(ENGAGE);
     let velocity = |bench: &mut Bench, blind: bool| {
         let mut input = bench.input(0);
         input
@@ -261,7 +226,7 @@ fn a_stop_without_a_held_arm_is_answered() {
     bench.command(ControlCommand::Stop);
     assert_eq!(bench.events, [ControlEvent::AtRest]);
     // On the heels of an engagement it is met.
-    bench.command(ControlCommand::Engage { hold: START_POSE });
+    bench.command(ENGAGE);
     bench.command(ControlCommand::Stop);
     assert_eq!(bench.latched(), Some(FaultCode::OperatorStop));
 }
@@ -317,9 +282,7 @@ fn a_stall_holds_setpoints_back() {
     bench.run(swing());
     bench.cycles(40);
     let sent = bench.sent.len();
-    let mut input = bench.input(0);
-    input.link.unanswered = strict.unanswered_max;
-    bench.step(input);
+    bench.cycle_with(|input| input.link.unanswered = strict.unanswered_max);
     assert_eq!(bench.sent.len(), sent, "held back");
     assert_eq!(bench.state.counts().skipped, 1);
 }
@@ -331,10 +294,9 @@ fn a_stop_is_not_acknowledged_by_what_was_ordered_before_it() {
     let mut bench = Bench::holding();
     bench.run(swing());
     bench.cycles(60);
-    let mut input = bench.input(0);
-    input.link.status = Some(Status(0x50));
-    input.command = Some(ControlCommand::Engage { hold: START_POSE });
-    bench.step(input);
+    bench.spoilt_cycles(1, Some(ENGAGE), |input| {
+        input.link.status = Some(Status(0x50));
+    });
     assert_eq!(bench.state.mode(), ControllerMode::Faulted);
     assert_eq!(bench.latched(), Some(FaultCode::ArmError));
     let fault = FaultCode::WrongMode;

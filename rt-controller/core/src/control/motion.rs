@@ -54,20 +54,25 @@ impl Motion {
     /// they do. RT-safe.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
-        let mut hash = Fingerprint::default();
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        let mut add = |value: f64| {
+            for byte in value.to_bits().to_le_bytes() {
+                hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+            }
+        };
         match self {
             Self::Spline(trajectory) => {
                 for (time_s, q) in trajectory.times_s().iter().zip(trajectory.waypoints()) {
-                    hash.add(*time_s);
-                    q.iter().for_each(|v| hash.add(*v));
+                    add(*time_s);
+                    q.iter().for_each(|v| add(*v));
                 }
             }
             Self::Move { phases, end } => {
-                phases.each_number(|v| hash.add(v));
-                end.iter().for_each(|v| hash.add(*v));
+                phases.each_number(&mut add);
+                end.iter().for_each(|v| add(*v));
             }
         }
-        hash.0
+        hash
     }
 
     /// Mode of the controller while it runs. RT-safe.
@@ -76,23 +81,6 @@ impl Motion {
         match self {
             Self::Spline(_) => ControllerMode::Streaming,
             Self::Move { .. } => ControllerMode::Moving,
-        }
-    }
-}
-
-/// FNV-1a, 64 bits.
-struct Fingerprint(u64);
-
-impl Default for Fingerprint {
-    fn default() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
-    }
-}
-
-impl Fingerprint {
-    fn add(&mut self, value: f64) {
-        for byte in value.to_bits().to_le_bytes() {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
         }
     }
 }

@@ -176,10 +176,6 @@ impl Chaos {
             }
         }
     }
-
-    fn sent(&mut self, q: JointVector) {
-        self.commanded = [q, self.commanded[0], self.commanded[1]];
-    }
 }
 
 /// Judges setpoints by their finite differences; it knows nothing of the
@@ -336,7 +332,7 @@ fn play(seed: u64, cycles: u64, tally: &mut Tally) {
             continue;
         };
         let q = state.summary().q_c;
-        chaos.sent(q);
+        chaos.commanded = [q, chaos.commanded[0], chaos.commanded[1]];
         tally.setpoints += 1;
         let mut part = judge.take(deadline_ns, q, &limits);
         if let ArmCommand::Velocity { qd, .. } = command {

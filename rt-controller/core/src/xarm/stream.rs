@@ -136,11 +136,7 @@ pub type FrameReader = StreamReader<CommandFraming>;
 
 impl Framing for CommandFraming {
     fn frame_len(pending: &[u8]) -> Result<Option<usize>, BrokenStream> {
-        let Some(header) = Header::parse(pending) else {
-            return Ok(None);
-        };
-        let (_, body_len) = header.check()?;
-        Ok(Some(HEADER_LEN.saturating_add(body_len)))
+        Ok(header(pending)?.map(|(_, _, body_len)| HEADER_LEN.saturating_add(body_len)))
     }
 }
 
@@ -153,12 +149,8 @@ impl FrameReader {
         let Some(frame) = self.next_bytes()? else {
             return Ok(None);
         };
-        let Some(header) = Header::parse(frame) else {
-            return Ok(None);
-        };
-        let (protocol, _) = header.check()?;
-        Ok(Some(Frame {
-            transaction: header.transaction,
+        Ok(header(frame)?.map(|(transaction, protocol, _)| Frame {
+            transaction,
             protocol,
             body: frame.get(HEADER_LEN..).unwrap_or_default(),
         }))
@@ -208,34 +200,20 @@ impl ReportReader {
     }
 }
 
-struct Header {
-    transaction: u16,
-    protocol: u16,
-    length: u16,
-}
-
-impl Header {
-    fn parse(bytes: &[u8]) -> Option<Self> {
-        let [t0, t1, p0, p1, l0, l1, ..] = *bytes else {
-            return None;
-        };
-        Some(Self {
-            transaction: u16::from_be_bytes([t0, t1]),
-            protocol: u16::from_be_bytes([p0, p1]),
-            length: u16::from_be_bytes([l0, l1]),
-        })
+/// Transaction, protocol and length of the body (bytes) from the header that `bytes` begin
+/// with, `None` while it is not whole.
+fn header(bytes: &[u8]) -> Result<Option<(u16, Protocol, usize)>, BrokenStream> {
+    let [t0, t1, p0, p1, l0, l1, ..] = *bytes else {
+        return Ok(None);
+    };
+    let code = u16::from_be_bytes([p0, p1]);
+    let protocol = Protocol::from_code(code).ok_or(BrokenStream::Protocol(code))?;
+    let length = u16::from_be_bytes([l0, l1]);
+    let body_len = usize::from(length);
+    if !(1..=MAX_BODY_LEN).contains(&body_len) {
+        return Err(BrokenStream::Length(length));
     }
-
-    fn check(&self) -> Result<(Protocol, usize), BrokenStream> {
-        let protocol =
-            Protocol::from_code(self.protocol).ok_or(BrokenStream::Protocol(self.protocol))?;
-        let length = usize::from(self.length);
-        if (1..=MAX_BODY_LEN).contains(&length) {
-            Ok((protocol, length))
-        } else {
-            Err(BrokenStream::Length(self.length))
-        }
-    }
+    Ok(Some((u16::from_be_bytes([t0, t1]), protocol, body_len)))
 }
 
 #[cfg(test)]

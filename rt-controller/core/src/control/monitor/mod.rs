@@ -94,11 +94,6 @@ impl Monitor {
         }
     }
 
-    /// A motion begins: counts start anew.
-    pub const fn motion_begins(&mut self) {
-        self.reports.motion_begins();
-    }
-
     /// How far the arm is behind what was commanded (rad); zero where its reports are too old
     /// to tell.
     #[must_use]

@@ -189,19 +189,30 @@ impl Prediction {
 mod tests {
     use super::*;
 
+    fn lag(dead_time_s: f64, w_rad_s: f64, damping_ratio: f64) -> Option<MeasuredLag> {
+        Some(MeasuredLag {
+            dead_time_s,
+            natural_frequency_rad_s: w_rad_s,
+            damping_ratio,
+        })
+    }
+
+    /// An arm that rests at zero, and what was sent to it.
+    fn at_zero(lags: MeasuredLags) -> (Prediction, Commanded) {
+        let zero = JointVector::ZERO;
+        (
+            Prediction::new(&lags).holding(zero),
+            Commanded::holding(zero),
+        )
+    }
+
     /// Closed forms of the unit step response, under-, critically and overdamped, fast and slow.
     #[test]
     fn steps_follow_their_closed_forms() {
         for (w, z) in [(60.0, 0.3), (60.0, 1.0), (15.0, 1.7), (3000.0, 10.0)] {
-            let lag = MeasuredLag {
-                dead_time_s: 0.02,
-                natural_frequency_rad_s: w,
-                damping_ratio: z,
-            };
-            let mut sent = Commanded::holding(JointVector::ZERO);
             let mut lags = [None; JOINTS];
-            lags[3] = Some(lag);
-            let mut joints = Prediction::new(&lags).holding(JointVector::ZERO);
+            lags[3] = lag(0.02, w, z);
+            let (mut joints, mut sent) = at_zero(lags);
             let start_ns = 1_000_000_000;
             for cycle in 0..60_u64 {
                 let now_ns = start_ns + cycle * 4_000_000;
@@ -233,13 +244,7 @@ mod tests {
 
     #[test]
     fn after_a_long_pause_it_rests_where_it_was_sent() {
-        let lag = MeasuredLag {
-            dead_time_s: 0.01,
-            natural_frequency_rad_s: 5.0,
-            damping_ratio: 0.9,
-        };
-        let mut joints = Prediction::new(&[Some(lag); JOINTS]).holding(JointVector::ZERO);
-        let mut sent = Commanded::holding(JointVector::ZERO);
+        let (mut joints, mut sent) = at_zero([lag(0.01, 5.0, 0.9); JOINTS]);
         for now_ns in (0..20_u64).map(|cycle| 1_000_000_000 + cycle * 4_000_000) {
             joints.advance(now_ns, &sent);
             sent.push(now_ns, JointVector::splat(1.0));
@@ -257,13 +262,7 @@ mod tests {
     /// A joint that is early or late by less than the tolerance is where it should be.
     #[test]
     fn bounds_reach_20_ms_before_and_after() {
-        let lag = MeasuredLag {
-            dead_time_s: 0.02,
-            natural_frequency_rad_s: 300.0,
-            damping_ratio: 1.0,
-        };
-        let mut joints = Prediction::new(&[Some(lag); JOINTS]).holding(JointVector::ZERO);
-        let mut sent = Commanded::holding(JointVector::ZERO);
+        let (mut joints, mut sent) = at_zero([lag(0.02, 300.0, 1.0); JOINTS]);
         let (start_ns, speed_rad_s) = (1_000_000_000, 2.0);
         let cycle_ns = |cycle: u32| start_ns + u64::from(cycle) * 4_000_000;
         for cycle in 0..50 {
