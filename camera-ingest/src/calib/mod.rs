@@ -14,6 +14,9 @@ mod mode;
 mod settings;
 mod yaml;
 
+/// The markers of a dictionary by its name, for whoever prints a board.
+#[cfg(feature = "calibration")]
+pub use calib_targets_charuco::resolve_dictionary;
 use std::path::Path;
 
 pub use error::CalibError;

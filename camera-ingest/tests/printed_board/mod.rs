@@ -1,8 +1,8 @@
 //! A printed board drawn in both images: the drawing is independent of the detector but for
 //! the markers' bits.
 
-use calib_targets_charuco::resolve_dictionary;
 use camera_ingest::calib::board::{Board, BoardPose};
+use camera_ingest::calib::resolve_dictionary;
 use camera_ingest::{ImageFrame, StereoFrame};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::SeedableRng;

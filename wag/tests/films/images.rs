@@ -1,5 +1,6 @@
 //! What the eyes' commands read and write, from files to files.
 
+#[cfg(feature = "calibration")]
 use super::printed_board;
 use super::support::{are_refused_in, json_in, shared};
 use arm_model::Cell;
@@ -178,6 +179,7 @@ fn off(found: &Path, truth: &StereoCamera) -> (f64, f64) {
     (away_m, degrees)
 }
 
+#[cfg(feature = "calibration")]
 #[test]
 fn a_board_tells_where_the_camera_stands() {
     let (board, truth) = (printed_board::board(), printed_board::camera());

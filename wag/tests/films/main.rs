@@ -3,6 +3,7 @@
 
 mod identify;
 mod images;
+#[cfg(feature = "calibration")]
 #[path = "../../../camera-ingest/tests/printed_board/mod.rs"]
 mod printed_board;
 #[path = "../support/mod.rs"]
