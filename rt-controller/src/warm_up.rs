@@ -65,7 +65,8 @@ pub fn swinging(from: JointVector) -> Result<Motion, TrajectoryError> {
 
 /// The report of an arm that is where it was commanded to be (rad) by the setpoint due
 /// at `due_ns`, received at `now_ns`.
-pub(crate) fn report(
+#[must_use]
+pub fn report(
     q: JointVector,
     interface: CommandInterface,
     due_ns: u64,

@@ -65,15 +65,9 @@ fn run(
     };
     let rings = rings();
     let mut bridge = rings.bridge;
-    let hold = ControlCommand::Engage { hold: START_POSE };
+    let command = ControlCommand::Engage { hold: START_POSE };
     let link = Some(Box::new(arm));
-    bridge
-        .commands
-        .push(CommandMsg {
-            command: hold,
-            link,
-        })
-        .unwrap();
+    bridge.commands.push(CommandMsg { command, link }).unwrap();
     let quit = Arc::new(AtomicBool::new(false));
     let clock = LateClock {
         now_ns: Cell::new(BEGIN_NS),

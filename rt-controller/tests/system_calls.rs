@@ -24,7 +24,7 @@ use rt_controller::os::{Clock, MonotonicClock, RealTimeSettings, enter_real_time
 use rt_controller::ports::{BridgePorts, Rings, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
-use rt_controller::warm_up::{CacheWarmUp, patient, swinging};
+use rt_controller::warm_up::{CacheWarmUp, patient, report, swinging};
 use rtrb::Producer;
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CyclePublisher, CycleRecord, JointReport, OperatorEnd,
@@ -224,15 +224,8 @@ impl Running {
             }
             while self.bridge.retired.pop().is_ok() {}
             while self.bridge.events.pop().is_ok() {}
-            let report = JointReport {
-                arm_state: 1,
-                arm_mode: 1,
-                stamp_ns: now_ns(),
-                arrival_ns: now_ns(),
-                q: self.newest.q_c,
-                ..JointReport::default()
-            };
-            let _ = self.reports.push(report);
+            let (q, interface) = (self.newest.q_c, patient().interface);
+            let _ = self.reports.push(report(q, interface, now_ns(), now_ns()));
             std::thread::sleep(Duration::from_millis(2));
         }
     }

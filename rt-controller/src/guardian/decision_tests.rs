@@ -9,10 +9,15 @@ const SILENCE_NS: u64 = 7 * PERIOD_NS;
 
 /// What is known at `now_ms` of a controller whose last cycle woke at `stamp_ms`.
 fn seen(now_ms: u64, stamp_ms: u64, moving: bool) -> GuardianInput {
+    seen_ns(now_ms * MS, stamp_ms * MS, moving)
+}
+
+/// The same in nanoseconds.
+fn seen_ns(now_ns: u64, stamp_ns: u64, moving: bool) -> GuardianInput {
     GuardianInput {
-        now_ns: now_ms * MS,
+        now_ns,
         pulse: Some(Pulse {
-            stamp_ns: stamp_ms * MS,
+            stamp_ns,
             moving,
             ..Pulse::default()
         }),
@@ -35,15 +40,10 @@ impl Scene {
     /// `dies_ns`.
     fn play(&mut self, guardian: &mut Guardian, from_ns: u64, dies_ns: u64, to_ns: u64) {
         for now_ns in (from_ns..to_ns).step_by(usize::try_from(TURN_NS).unwrap()) {
+            let stamp_ns = now_ns.min(dies_ns) / PERIOD_NS * PERIOD_NS;
             let input = GuardianInput {
-                now_ns,
-                pulse: Some(Pulse {
-                    stamp_ns: now_ns.min(dies_ns) / PERIOD_NS * PERIOD_NS,
-                    moving: true,
-                    ..Pulse::default()
-                }),
                 arm_state: self.stops_ns.map(|t| if now_ns >= t { 4 } else { 1 }),
-                connected: true,
+                ..seen_ns(now_ns, stamp_ns, true)
             };
             let out = guardian.step(&input);
             if out.ask_stop {
@@ -69,16 +69,7 @@ fn a_gap_that_the_controller_meets_itself_is_left_to_it() {
         let begin_ns = 1_000 * MS + rng.random_range(0..TURN_NS);
         let gap_ns = u64::from(lost + 1) * PERIOD_NS;
         for now_ns in (begin_ns..begin_ns + 3 * gap_ns).step_by(2_000_000) {
-            let input = GuardianInput {
-                pulse: Some(Pulse {
-                    stamp_ns: now_ns / gap_ns * gap_ns,
-                    moving: true,
-                    ..Pulse::default()
-                }),
-                connected: true,
-                now_ns,
-                ..GuardianInput::default()
-            };
+            let input = seen_ns(now_ns, now_ns / gap_ns * gap_ns, true);
             assert!(!guardian.step(&input).ask_stop, "{lost} cycles lost");
         }
     }

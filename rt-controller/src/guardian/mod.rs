@@ -124,7 +124,7 @@ impl Runner {
             self.tell(phase);
         }
         if let Some(watched) = &mut self.watched {
-            watched.beat(GuardianBeat {
+            watched.end.beat(GuardianBeat {
                 phase: self.watchdog.phase() as u8,
                 connected: u8::from(self.line.is_answered(now_ns)),
                 stamp_ns: now_ns,

@@ -3,13 +3,14 @@
 use super::decision::Pulse;
 use crate::os::process::{ProcessWatch, thread_lives, thread_of};
 use crate::process::CONTROL_THREAD;
-use shared_types::ipc::{Bus, ControllerMode, GuardianBeat, GuardianEnd, IpcError, StateReader};
+use shared_types::ipc::{Bus, ControllerMode, GuardianEnd, IpcError, StateReader};
 
 /// A controller that was found, dead or alive.
 #[derive(Debug)]
 pub(super) struct Watched {
     state: StateReader,
-    end: GuardianEnd,
+    /// Where the guardian writes its own sign of life.
+    pub(super) end: GuardianEnd,
     process: Option<ProcessWatch>,
     pid: u32,
     /// Its control thread, as the system counts.
@@ -53,10 +54,5 @@ impl Watched {
     fn has_ended(&self) -> bool {
         let thread_ended = self.thread.is_some_and(|id| !thread_lives(self.pid, id));
         thread_ended || self.process.as_ref().is_some_and(ProcessWatch::has_ended)
-    }
-
-    /// Writes a sign of life of the guardian.
-    pub(super) fn beat(&mut self, beat: GuardianBeat) {
-        self.end.beat(beat);
     }
 }

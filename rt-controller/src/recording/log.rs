@@ -101,14 +101,6 @@ impl<'a> LogReader<'a> {
         }
     }
 
-    /// Steps over what cannot be read.
-    fn skip(&mut self, rest: &[u8]) -> Flaw {
-        let offset = self.offset;
-        let bytes = chunk::distance_to_next(rest);
-        self.offset += bytes;
-        Flaw::Damaged { offset, bytes }
-    }
-
     /// Takes in the next chunk; `None` at the end.
     fn next_chunk(&mut self) -> Option<Option<Flaw>> {
         let rest = self.bytes.get(self.offset..).filter(|r| !r.is_empty())?;
@@ -139,7 +131,9 @@ impl<'a> LogReader<'a> {
             Front::Cut | Front::OtherFormat(_) | Front::Damaged => {
                 // The checksum says that a chunk is missing; the numbers need not.
                 self.next_sequence = None;
-                Some(Some(self.skip(rest)))
+                let (offset, bytes) = (self.offset, chunk::distance_to_next(rest));
+                self.offset += bytes;
+                Some(Some(Flaw::Damaged { offset, bytes }))
             }
         }
     }

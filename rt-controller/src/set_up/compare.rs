@@ -226,10 +226,7 @@ impl SetUp<'_> {
 
     /// Waits until the arm reports the tool and the settings that it must have.
     pub(super) fn read_settings_back(&self) -> Result<(), SetUpError> {
-        wait_for_report(|| {
-            let (normal, rich) = read_status(self.status())?;
-            Ok(self.settings_without_effect(&normal, rich.as_ref()))
-        })
+        self.wait_for_report(|_| None)
     }
 
     /// Waits until the arm reports that it is ready in `mode`, enabled, and still set as it
@@ -237,11 +234,24 @@ impl SetUp<'_> {
     pub(super) fn read_all_back(&self, mode: Mode) -> Result<(), SetUpError> {
         // A report that was made before the last command proves nothing.
         std::thread::sleep(REPORT_LAG);
-        wait_for_report(|| {
+        self.wait_for_report(|normal| without_effect(mode, normal))
+    }
+
+    /// Asks until nothing is `missing` and all settings have effect; after 3 s that is the error.
+    fn wait_for_report(
+        &self,
+        missing: impl Fn(&NormalReport) -> Option<SetUpError>,
+    ) -> Result<(), SetUpError> {
+        let began = Instant::now();
+        loop {
             let (normal, rich) = read_status(self.status())?;
-            let found = without_effect(mode, &normal);
-            Ok(found.or_else(|| self.settings_without_effect(&normal, rich.as_ref())))
-        })
+            let found = missing(&normal);
+            match found.or_else(|| self.settings_without_effect(&normal, rich.as_ref())) {
+                None => return Ok(()),
+                Some(error) if began.elapsed() > READY_TIMEOUT => return Err(error),
+                Some(_) => std::thread::sleep(REPORT_LAG),
+            }
+        }
     }
 
     fn settings_without_effect(
@@ -264,20 +274,6 @@ impl SetUp<'_> {
         let fault = FaultCode::ArmDiffers;
         Some(SetUpError { fault, message })
     }
-}
-
-/// Asks until nothing is `missing` any more; after 3 s that is the error.
-fn wait_for_report(
-    missing: impl Fn() -> Result<Option<SetUpError>, SetUpError>,
-) -> Result<(), SetUpError> {
-    let began = Instant::now();
-    while let Some(error) = missing()? {
-        if began.elapsed() > READY_TIMEOUT {
-            return Err(error);
-        }
-        std::thread::sleep(REPORT_LAG);
-    }
-    Ok(())
 }
 
 /// What keeps the arm from following setpoints in `mode`, by its report.

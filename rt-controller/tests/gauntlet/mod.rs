@@ -16,6 +16,7 @@ use rt_controller::os::Clock;
 use rt_controller::ports::{BridgePorts, Rings, rings};
 use rt_controller::rt_loop::RtLoop;
 use rt_controller::transport::tcp::{LinkSettings, TcpLink};
+use rt_controller::warm_up::report;
 use rtrb::Producer;
 use shared_types::ipc::{
     Bus, ControllerBoards, ControllerMode, CycleRecord, GuardianBeat, GuardianEnd, JointReport,
@@ -188,14 +189,7 @@ impl<'w> Bench<'w> {
     }
 
     fn report(&mut self) -> JointReport {
-        let mut report = JointReport {
-            arm_state: 1,
-            arm_mode: self.interface.arm_mode(),
-            stamp_ns: self.now_ns,
-            arrival_ns: self.now_ns,
-            q: self.newest.q_c,
-            ..JointReport::default()
-        };
+        let mut report = report(self.newest.q_c, self.interface, self.now_ns, self.now_ns);
         match self.disturbance.reports {
             Some(spoil) => {
                 self.disturbed_cycles += 1;
