@@ -10,6 +10,7 @@ use super::config::ArmConfig;
 use super::controller_clock::ControllerClock;
 use super::event::{ArmCounters, ArmEvent, TimedEvent};
 use super::feedback::{Feedback, FeedbackKind};
+use super::history::JointSample;
 use super::joint::JointDynamics;
 use super::pacer::Pacer;
 use super::reference::{Move, Reference, Task};

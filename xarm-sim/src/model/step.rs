@@ -4,6 +4,17 @@
 use super::*;
 
 impl ArmModel {
+    /// Runs whole steps up to `now` and gives the motion after each.
+    pub fn advance_to(&mut self, now: MonotonicNs, mut each: impl FnMut(JointSample)) {
+        while self.time.0 + STEP_NS <= now.0 {
+            self.step();
+            each(JointSample {
+                at: self.time,
+                state: self.true_motion(),
+            });
+        }
+    }
+
     /// One step of 1 ms.
     pub fn step(&mut self) {
         let end = MonotonicNs(self.time.0 + STEP_NS);
