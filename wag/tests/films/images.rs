@@ -1,7 +1,5 @@
 //! What the eyes' commands read and write, from files to files.
 
-#[cfg(feature = "calibration")]
-use super::printed_board;
 use super::support::{are_refused_in, json_in, shared};
 use arm_model::Cell;
 use arm_model::joint::START_POSE;
@@ -14,7 +12,6 @@ use rig_sim::CameraConfig;
 use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose};
 use rope_sim::PoseTrack;
 use run_log::files::read_pose;
-use serde_json::Value;
 use shared_types::{KeypointTrack, StereoCamera};
 use std::fs;
 use std::path::Path;
@@ -146,7 +143,11 @@ fn a_film_on_another_clock_is_told_and_put_right() {
 }
 
 /// A camera's settings, thought to stand elsewhere, and some frames of it.
-fn film_of(frames: &[StereoFrame], camera: &StereoCamera, mode: VideoMode) -> tempfile::TempDir {
+pub(super) fn film_of(
+    frames: &[StereoFrame],
+    camera: &StereoCamera,
+    mode: VideoMode,
+) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     let raw: Vec<u8> = frames.iter().flat_map(yuyv).collect();
@@ -170,59 +171,13 @@ fn film_of(frames: &[StereoFrame], camera: &StereoCamera, mode: VideoMode) -> te
 }
 
 /// How far a camera found stands from the true one (m, degrees).
-fn off(found: &Path, truth: &StereoCamera) -> (f64, f64) {
+pub(super) fn off(found: &Path, truth: &StereoCamera) -> (f64, f64) {
     let found = load_camera(found).unwrap();
     let turn = Rotation3::from_matrix_unchecked(found.r_w_cam.transpose() * truth.r_w_cam);
     let away_m = (found.p_w_cam_m - truth.p_w_cam_m).norm();
     let (away_mm, degrees) = (1e3 * away_m, turn.angle().to_degrees());
     println!("{away_mm:.2} mm and {degrees:.3} degrees off");
     (away_m, degrees)
-}
-
-#[cfg(feature = "calibration")]
-#[test]
-fn a_board_tells_where_the_camera_stands() {
-    let (board, truth) = (printed_board::board(), printed_board::camera());
-    let frames = printed_board::film(&board, &truth, 1);
-    let dir = film_of(&frames, &truth, VideoMode::Hd);
-    let at = |name: &str| dir.path().join(name);
-    fs::write(at("board.toml"), toml::to_string(&board).unwrap()).unwrap();
-    let mut other = board.clone();
-    other.dictionary = "DICT_9X9".to_owned();
-    fs::write(at("other.toml"), toml::to_string(&other).unwrap()).unwrap();
-
-    let film = "--video film_2560x720.yuyv --fps 30";
-    let find = format!("calib extrinsics --camera thought.toml {film}");
-    let found = format!("{find} --board board.toml --out found.toml");
-    let report = json_in(dir.path(), &found);
-    let (away_m, away_degrees) = off(&at("found.toml"), &truth);
-    assert!(away_m <= 0.003 && away_degrees <= 0.2);
-    let rms_px = |report: &Value| report["residual"]["rms_px"].as_f64().unwrap();
-    assert!(rms_px(&report) < 0.3, "{report}");
-    assert!(report["position_error_m"].as_f64().unwrap() > 0.0);
-
-    let check = |camera: &str| format!("calib check --camera {camera} {film} --board board.toml");
-    let report = json_in(dir.path(), &check("found.toml"));
-    assert!(rms_px(&report) < 0.3, "{report}");
-    for (camera, words) in [
-        ("thought.toml", "wag calib extrinsics"),
-        ("turned.toml", "sign is wrong"),
-    ] {
-        are_refused_in(dir.path(), 1, &format!("{} => {words}", check(camera)));
-    }
-
-    let refused = |shown: &str, words: &str| {
-        let case = format!("{find} --out no.toml {shown} => {words}");
-        are_refused_in(dir.path(), 2, &case);
-    };
-    refused("--board other.toml", "other.toml | DICT_9X9");
-    refused("", "--board");
-    refused("--lead shown.csv", "--lead-rgb");
-    let lead = "--lead shown.csv --lead-rgb 240,150,30";
-    fs::write(at("shown.csv"), "frame,x,y,z\n7,0,0,0\n").unwrap();
-    refused(lead, "shown.csv | frame 7");
-    fs::write(at("shown.csv"), "frame,x,y,z\n0,0,nan,0\n").unwrap();
-    refused(lead, "shown.csv | finite");
 }
 
 #[test]
