@@ -1,6 +1,6 @@
 //! A controller that runs as a service: what it is configured for, asked before anything moves.
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::Limits;
 use rt_controller::ControllerConfig;
 use shared_types::FaultCode;
@@ -38,19 +38,14 @@ impl Service {
             )),
             Err(reason) => Err(reason.into()),
         };
-        let unclear = |event| anyhow!("the controller of `{domain}` answered with {event:?}");
-        let config: ControllerConfig = match ask(&ControllerRequest::Configuration)? {
-            ControllerEvent::Configuration(text) => toml::from_str(&text)
-                .with_context(|| format!("configuration of the controller of `{domain}`"))?,
-            other => return Err(unclear(other)),
-        };
+        let config = configuration(&ask(&ControllerRequest::Configuration)?)?;
         let stopped = match ask(&ControllerRequest::Status)? {
             ControllerEvent::Status { mode, fault, .. } => match mode {
                 ControllerMode::Offline | ControllerMode::Idle => None,
                 ControllerMode::Faulted => Some(fault),
                 busy => bail!("the controller of `{domain}` is {busy:?}: somebody else uses it"),
             },
-            other => return Err(unclear(other)),
+            other => bail!("the controller of `{domain}` answered with {other:?}"),
         };
         let limits = config.resolve_limits()?;
         Ok(Self {
@@ -58,5 +53,26 @@ impl Service {
             limits,
             stopped,
         })
+    }
+
+    /// Refuses a controller that was started anew with another configuration since it was found.
+    pub fn require_unchanged(&self, now: &ControllerEvent) -> anyhow::Result<()> {
+        let same = configuration(now)? == self.config;
+        ensure!(
+            same,
+            "the controller of `{}` was started anew with another configuration meanwhile; run the command again",
+            self.config.domain
+        );
+        Ok(())
+    }
+}
+
+/// The configuration that a controller answered with.
+fn configuration(event: &ControllerEvent) -> anyhow::Result<ControllerConfig> {
+    match event {
+        ControllerEvent::Configuration(text) => {
+            toml::from_str(text).context("configuration of the running controller")
+        }
+        other => bail!("the controller was asked for its configuration and answered {other:?}"),
     }
 }

@@ -34,7 +34,7 @@ const WAYPOINTS: usize = 13;
 /// Longest and shortest swing that is tried (s).
 const LASTS_S: [f64; 2] = [0.4, 12.0];
 /// A joint that is slower stands still (rad/s).
-const STILL_RAD_S: f64 = 5e-3;
+const STILL_RAD_S: f64 = 1e-2;
 /// How long the joints are watched after a stop.
 const WATCHED: Duration = Duration::from_millis(1500);
 /// Longest wait for an answer of the arm.
