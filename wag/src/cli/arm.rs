@@ -40,11 +40,12 @@ pub struct ArmArgs {
     #[command(flatten)]
     pub ports: ArmPorts,
     /// The area is clear and the emergency stop is in reach for the bring-up and the move to
-    /// the start pose. Asked for unless this is given or the arm proves that it is simulated.
+    /// the start pose. Confirmed at the terminal unless this is given or the arm proves that it is
+    /// simulated.
     /// In the start pose a real arm's motion is confirmed at standard input all the same.
     #[arg(long, alias = "confirm")]
     pub yes: bool,
-    /// Ask as for a real arm where the arm is simulated, too: a rehearsal.
+    /// Ask as for a real arm where the arm is simulated, too, for practice.
     #[arg(long)]
     pub ask: bool,
     /// Who operates the arm, for the run's record. Default: the user's name.
