@@ -59,10 +59,14 @@ impl Flight {
     /// Largest speed of a pole's end in the controller's own moves, as commanded (m/s).
     pub fn pole_top_m_s(&self, pole: &Pole) -> f64 {
         let moving = |c: &&RecordedCycle| c.record.mode == ControllerMode::Moving as u8;
-        let moved = self.cycles.iter().filter(moving);
-        let ends: Vec<_> = moved.map(|c| pole.attach_pose(&c.record.q_c).0).collect();
-        let steps_m = ends.windows(2).map(|w| (w[1] - w[0]).norm());
-        steps_m.fold(0.0, f64::max) / self.limits.period_s()
+        let moved: Vec<_> = self.cycles.iter().filter(moving).collect();
+        let end_m = |c: &RecordedCycle| pole.attach_pose(&c.record.q_c).0;
+        let speeds_m_s = moved.windows(2).map(|pair| {
+            // A busy machine misses cycles: what counts is the time that passed.
+            let passed_ns = pair[1].record.deadline_ns - pair[0].record.deadline_ns;
+            (end_m(pair[1]) - end_m(pair[0])).norm() / (1e-9 * passed_ns as f64)
+        });
+        speeds_m_s.fold(0.0, f64::max)
     }
 
     /// Cycles whose setpoint went out.

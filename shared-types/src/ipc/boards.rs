@@ -64,7 +64,8 @@ pub struct OperatorEnd {
 
 impl OperatorEnd {
     /// Takes the operator's place in a running controller's domain. There is
-    /// one operator at a time; one that was killed leaves its place free.
+    /// one operator at a time; one that was killed leaves its place free. What the one
+    /// before asked for or let go of is not this one's.
     ///
     /// # Errors
     /// [`IpcError::Open`] when there is no controller or the place is taken.
@@ -73,6 +74,7 @@ impl OperatorEnd {
         let last = OperatorBeat {
             version: PAYLOAD_VERSION,
             stop: 0,
+            released: 0,
             ..before
         };
         Ok(Self { place, last })

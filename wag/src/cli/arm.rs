@@ -35,7 +35,7 @@ pub struct ArmArgs {
     pub controller: Option<String>,
     /// Go on although the controller of --controller has stopped: you know why, and the arm may
     /// be enabled again.
-    #[arg(long, requires = "controller")]
+    #[arg(long, requires = "controller", conflicts_with = "address")]
     pub acknowledge: bool,
     #[command(flatten)]
     pub ports: ArmPorts,

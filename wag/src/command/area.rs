@@ -28,7 +28,7 @@ pub fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
         let service = Service::find(domain).or_failed()?;
         if let Some(fault) = service.stopped.filter(|_| !arm.acknowledge) {
             return Err(failed!(
-                "the controller of `{domain}` has stopped ({fault:?}): {}; look at the arm, then add --acknowledge",
+                "the controller of `{domain}` has stopped ({fault:?}), in the run before or at its end. Look at the arm and at why (`wag explain` of that run), then add --acknowledge; of this fault the manual says: {}",
                 fault.explain()
             ));
         }

@@ -11,6 +11,7 @@ use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use run_log::{Cycles, files};
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
+use shared_types::ipc::IpcError;
 use std::path::{Path, PathBuf};
 
 /// Part of the arm's speed limits used for the move to the start pose.
@@ -61,6 +62,13 @@ pub fn on_arm(
     session.end(result.is_ok());
     let cycles = std::mem::take(&mut session.received.cycles);
     let epoch_ns = cycles.cycles.first().map_or(0, |c| c.deadline_ns);
+    let by_service = address.service.is_some();
+    let result = result.map_err(|error| match error.downcast_ref() {
+        Some(IpcError::Gone { .. }) if by_service => error.context(
+            "the controller that runs as a service ended; an arm that moved is stopped by its guardian, whose log says so: look at the arm, and start both again",
+        ),
+        _ => error,
+    });
     let result = result.and_then(|value| conclude(folder.path.as_path(), cycles, value));
     let mut summary = match &result {
         Ok(value) => value.clone(),
@@ -77,7 +85,10 @@ pub fn on_arm(
     summary["bring_up"] = found.steps.iter().map(step).collect();
     let kept = files::write_json(&folder.file(files::SUMMARY), &summary);
     let recorded = session.finish_run_file();
-    explain_stop(&folder.path);
+    // A stop that was measured needs no explanation.
+    if result.is_err() {
+        explain_stop(&folder.path);
+    }
     let value = result.or_failed()?;
     recorded.or_failed()?;
     kept.or_failed()?;

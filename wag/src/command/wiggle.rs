@@ -18,7 +18,7 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
     }
     if args.csv.is_none() && !args.arm.names_arm() && !args.arm.dry_run {
         return Err(bad_input!(
-            "choose what to do with the wiggle: --csv FILE writes it, --arm ADDR executes it, --evaluate reports its information"
+            "choose what to do with the wiggle: --csv FILE writes it, --arm ADDR or --controller NAME executes it, --evaluate reports its information"
         ));
     }
     let address = reach_measured(&args.arm)?;

@@ -1,7 +1,7 @@
 //! Asking the controller: bring-up, moves, trajectories, latencies.
 
 use crate::session::Session;
-use anyhow::{anyhow, ensure};
+use anyhow::{Context, anyhow, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use rt_controller::os::now_ns;
 use shared_types::OperatingMode;
@@ -79,7 +79,8 @@ pub struct BringUp {
 /// Takes the operator's place, connects the arm and enables it; what was `found` on the way,
 /// also when it is refused.
 pub fn acquire(session: &mut Session, arm: &ArmLink, found: &mut BringUp) -> anyhow::Result<()> {
-    session.take_operator()?;
+    let taken = "the operator's place at the controller cannot be had: end the other command that uses it, then run this one again";
+    session.take_operator().context(taken)?;
     enable(session, arm, found)
 }
 

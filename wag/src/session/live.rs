@@ -199,7 +199,9 @@ impl Session {
             self.supervisor.check()?;
         }
         if is_interrupted() {
-            bail!("interrupted; the arm was commanded to stop and all processes were ended");
+            bail!(
+                "interrupted; the arm was commanded to stop and all processes of this command were ended"
+            );
         }
         Ok(())
     }

@@ -84,7 +84,10 @@ fn a_service_takes_one_command_after_the_other_and_a_stop_is_acknowledged() {
         }
     }
 
-    let broken_off = command(&format!("{on} broken-off"));
+    // Standard input has ended: that of the next command is its own.
+    let let_go = refused_in(here, 1, &format!("{on} let-go --dead-man"));
+    assert!(let_go.contains("DeadManReleased"), "{let_go}");
+    let broken_off = command(&format!("{on} broken-off --acknowledge"));
     let mut broken_off = { broken_off }.current_dir(here).spawn().unwrap();
     until_recorded(&here.join("broken-off"), 100);
     send(broken_off.id(), Signal::INT);
