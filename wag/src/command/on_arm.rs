@@ -12,8 +12,11 @@ use run_log::{Cycles, files};
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
 use shared_types::ipc::IpcError;
+use shared_types::ipc::message::ControllerRequest;
 use std::path::{Path, PathBuf};
 
+/// How the arm is when a motion is confirmed.
+pub const AT_START: &str = "The arm stands at the start.";
 /// Part of the arm's speed limits used for the move to the start pose.
 pub const MOVE_SPEED: f64 = 0.1;
 
@@ -51,7 +54,14 @@ pub fn on_arm(
     }
     let mut found = BringUp::default();
     let worked = |session: &mut Session| -> anyhow::Result<Value> {
-        let link = bring_up(session, &folder, &address, limits, start, &mut found)?;
+        let link = bring_up(
+            session,
+            &folder,
+            (&address, arm.acknowledge),
+            limits,
+            start,
+            &mut found,
+        )?;
         let mut value = work(session, &link)?;
         value["ok"] = true.into();
         value["run"] = json!(folder.path);
@@ -99,7 +109,7 @@ pub fn on_arm(
 fn bring_up(
     session: &mut Session,
     folder: &RunFolder,
-    address: &ArmAddress,
+    (address, acknowledges): (&ArmAddress, bool),
     limits: &Limits,
     start: JointVector,
     found: &mut BringUp,
@@ -107,7 +117,13 @@ fn bring_up(
     let stage = Stage::begin("bring-up");
     pipeline::start_recorder(session, folder, limits, None, None)?;
     let link = pipeline::controller(session, folder, limits, address)?;
-    pipeline::acquire(session, &link, found)?;
+    session.take_operator()?;
+    if let Some(service) = &address.service {
+        // What was asked, checked and confirmed was so for that configuration.
+        let now = session.ask(&link, &ControllerRequest::Configuration, 5.0, |_| ())?;
+        service.require_unchanged(&now)?;
+    }
+    pipeline::enable(session, &link, acknowledges, found)?;
     for warning in &found.warnings {
         tracing::warn!("{warning}");
     }

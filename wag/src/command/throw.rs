@@ -2,7 +2,7 @@
 
 use super::area::{asks, limits, reach_measured, require_clear_area};
 use super::dry_run;
-use super::on_arm::on_arm;
+use super::on_arm::{AT_START, on_arm};
 use super::plan::LOOK;
 use super::unconfirmed::confirm;
 use crate::cli::{ArmArgs, ThrowArgs};
@@ -92,7 +92,9 @@ pub fn drive(
     let start = trajectory.start();
     let is_asked = asks(arm, &address);
     let work = |session: &mut Session, link: &ArmLink| {
-        let confirmed_ns = is_asked.then(|| session.confirm(word)).transpose()?;
+        let confirmed_ns = is_asked
+            .then(|| session.confirm(AT_START, word))
+            .transpose()?;
         session.await_hold()?;
         let stage = Stage::begin("stream");
         pipeline::latency(session, link)?;

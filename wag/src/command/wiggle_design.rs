@@ -32,7 +32,7 @@ fn classify(error: DesignError) -> Failure {
 }
 
 pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
-    if args.arm.address.is_some() {
+    if args.arm.names_arm() {
         return Err(bad_input!(
             "--evaluate and --optimise move nothing: leave --arm out, or execute the wiggle without them"
         ));

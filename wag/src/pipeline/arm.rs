@@ -1,7 +1,7 @@
 //! Asking the controller: bring-up, moves, trajectories, latencies.
 
 use crate::session::Session;
-use anyhow::{Context, anyhow, ensure};
+use anyhow::{anyhow, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use rt_controller::os::now_ns;
 use shared_types::OperatingMode;
@@ -79,18 +79,22 @@ pub struct BringUp {
 /// Takes the operator's place, connects the arm and enables it; what was `found` on the way,
 /// also when it is refused.
 pub fn acquire(session: &mut Session, arm: &ArmLink, found: &mut BringUp) -> anyhow::Result<()> {
-    let taken = "the operator's place at the controller cannot be had: end the other command that uses it, then run this one again";
-    session.take_operator().context(taken)?;
-    enable(session, arm, found)
+    session.take_operator()?;
+    enable(session, arm, false, found)
 }
 
-/// Enables the arm, also after a stop, which is acknowledged by it.
-pub fn enable(session: &mut Session, arm: &ArmLink, found: &mut BringUp) -> anyhow::Result<()> {
+/// Enables the arm; after a stop only where the operator `acknowledges` it.
+pub fn enable(
+    session: &mut Session,
+    arm: &ArmLink,
+    acknowledges: bool,
+    found: &mut BringUp,
+) -> anyhow::Result<()> {
     let bring_up = match session.ask(arm, &ControllerRequest::Status, 5.0, |_| ())? {
         ControllerEvent::Status {
             mode: ControllerMode::Faulted,
             ..
-        } => ControllerRequest::Acknowledge,
+        } if acknowledges => ControllerRequest::Acknowledge,
         _ => ControllerRequest::Bringup,
     };
     let done = session.ask(arm, &bring_up, 20.0, |event| {

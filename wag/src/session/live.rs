@@ -3,7 +3,7 @@
 
 use super::presence::{Presence, Switch};
 use super::{ProcessSpec, Received, RunFile, Supervisor};
-use anyhow::bail;
+use anyhow::{Context, bail};
 use cli_output::is_interrupted;
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
@@ -97,18 +97,18 @@ impl Session {
         Ok(())
     }
 
-    /// Asks the operator whether the area is clear; when `word` confirmed it (CLOCK_MONOTONIC,
-    /// ns).
+    /// Asks the operator whether the area is clear, `now` that the arm is as it is; when `word`
+    /// confirmed it (CLOCK_MONOTONIC, ns).
     ///
     /// # Errors
     /// Something else was typed, or nothing, or nobody is there.
-    pub fn confirm(&mut self, word: &'static str) -> anyhow::Result<u64> {
+    pub fn confirm(&mut self, now: &str, word: &'static str) -> anyhow::Result<u64> {
         let Some(presence) = &mut self.presence else {
             bail!("nobody is watched who could confirm");
         };
         presence.request(word);
         eprint!(
-            "The arm stands at the start. Emergency stop in reach, nobody within reach of arm and rope?\n\
+            "{now} Emergency stop in reach, nobody within reach of arm and rope?\n\
              Area clear: type {word} "
         );
         let began = Instant::now();
@@ -239,7 +239,8 @@ impl Session {
 
     /// Takes the operator's place at a running controller.
     pub fn take_operator(&mut self) -> anyhow::Result<()> {
-        self.operator = Some(OperatorEnd::take(&self.bus)?);
+        let taken = "the operator's place at the controller cannot be had: end the other command that uses it, then run this one again";
+        self.operator = Some(OperatorEnd::take(&self.bus).context(taken)?);
         Ok(())
     }
 

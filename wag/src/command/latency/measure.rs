@@ -3,7 +3,7 @@
 use super::evidence::Evidence;
 use crate::cli::LatencyArgs;
 use crate::command::area::{asks, limits, reach, require_clear_area};
-use crate::command::on_arm::on_arm;
+use crate::command::on_arm::{AT_START, on_arm};
 use crate::config;
 use crate::pipeline::{self, ArmAddress};
 use anyhow::Context;
@@ -81,7 +81,7 @@ pub(super) fn measure(
         place,
         |session, link| {
             if is_asked {
-                session.confirm("MEASURE")?;
+                session.confirm(AT_START, "MEASURE")?;
                 pipeline::arm_for(session, link, OperatingMode::SetUp, None)?;
             }
             session.await_hold()?;

@@ -6,7 +6,7 @@
 
 use crate::cli::LatencyArgs;
 use crate::command::area::{asks, limits, reach_measured, require_clear_area};
-use crate::command::on_arm::{MOVE_SPEED, on_arm};
+use crate::command::on_arm::{AT_START, MOVE_SPEED, on_arm};
 use crate::config;
 use crate::pipeline::{self, ArmLink, BringUp};
 use crate::session::Session;
@@ -20,10 +20,10 @@ use rt_controller::control::{Motion, OperatingModeSpeeds};
 use rt_controller::os::now_ns;
 use rt_controller::session::ArmSession;
 use serde_json::{Value, json};
-use shared_types::OperatingMode;
 use shared_types::ipc::JointReport;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
+use shared_types::{FaultCode, OperatingMode};
 use std::net::SocketAddr;
 use std::time::Duration;
 
@@ -37,6 +37,8 @@ const LASTS_S: [f64; 2] = [0.4, 12.0];
 const STILL_RAD_S: f64 = 1e-2;
 /// How long the joints are watched after a stop.
 const WATCHED: Duration = Duration::from_millis(1500);
+/// How the arm is before it returns for the next swing.
+const STOPPED: &str = "The arm was stopped; it will be enabled and returns to the start.";
 /// Longest wait for an answer of the arm.
 const ANSWERED: Duration = Duration::from_secs(1);
 
@@ -45,6 +47,26 @@ const ANSWERED: Duration = Duration::from_secs(1);
 enum Way {
     Brake,
     State4,
+}
+
+impl Way {
+    /// Whether a motion that ended so was stopped in this way, and not by something that nobody
+    /// asked for.
+    fn is_met_by(self, end: &ControllerEvent) -> bool {
+        match end {
+            ControllerEvent::Stopped {
+                fault,
+                arm_error: 0,
+                ..
+            } => match self {
+                Self::Brake => *fault == FaultCode::OperatorStop,
+                Self::State4 => {
+                    matches!(fault, FaultCode::ArmNotReady | FaultCode::ArmModeChanged)
+                }
+            },
+            _ => false,
+        }
+    }
 }
 
 /// One stop.
@@ -113,6 +135,9 @@ fn stop(
     let half_ns = start_ns + (0.5e9 * swing.duration_s()) as u64;
     while now_ns() < half_ns {
         session.tick()?;
+        if let Some(event) = motion.try_next()? {
+            bail!("the swing ended before it was to be stopped: {event:?}");
+        }
         std::thread::sleep(Duration::from_millis(1));
     }
     let told_ns = now_ns();
@@ -122,13 +147,21 @@ fn stop(
             "controller's brake"
         }
         Way::State4 => {
-            line.stop_arm()?;
+            let taken = line.stop_arm()?;
+            ensure!(
+                taken,
+                "the arm was asked to stop and does not say that it has"
+            );
             "arm (state 4)"
         }
     };
-    let end = session.finish(&motion, 5.0, |_| ())?;
-    let is_stopped = matches!(end, ControllerEvent::Stopped { .. });
-    ensure!(is_stopped, "the swing was not stopped: {end:?}");
+    let end = session.finish(&motion, 5.0, |_| ());
+    session.end_hold();
+    let end = end?;
+    ensure!(
+        way.is_met_by(&end),
+        "something else stopped the swing: {end:?}"
+    );
     session.idle(WATCHED)?;
     let reports = session.received.cycles.reports();
     let before = reports.iter().rev().find(|r| r.stamp_ns <= told_ns);
@@ -173,16 +206,21 @@ pub(super) fn measure(args: &LatencyArgs) -> Outcome<Value> {
         for (mode, swing) in &swings {
             for way in [Way::Brake, Way::State4] {
                 if !stops.is_empty() {
-                    pipeline::enable(session, link, &mut BringUp::default())?;
+                    // Who looked at the arm acknowledges the stop.
+                    is_asked
+                        .then(|| session.confirm(STOPPED, "MOVE"))
+                        .transpose()?;
+                    pipeline::enable(session, link, true, &mut BringUp::default())?;
                     pipeline::arm_for(session, link, SetUp, None)?;
                     pipeline::move_to(session, link, START_POSE, MOVE_SPEED)?;
                 }
-                let word = is_asked.then(|| session.confirm("MEASURE")).transpose()?;
+                let word = is_asked
+                    .then(|| session.confirm(AT_START, "MEASURE"))
+                    .transpose()?;
                 session.await_hold()?;
                 let stage = Stage::begin("stop");
                 pipeline::arm_for(session, link, *mode, Some(word.unwrap_or_else(now_ns)))?;
                 let stopped = stop(session, link, arm, &pole, swing, (*mode, way))?;
-                session.end_hold();
                 stage.done(&format!(
                     "{:?}, by the {}: {:.2} m/s to rest in {:.0} ms and {:.0} mm",
                     mode,
@@ -228,4 +266,32 @@ fn show(stops: &[Stopped]) {
         "stopped by",
     ];
     println!("{}", table::numbers(header, 1, rows));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_stop_that_was_asked_for_is_measured() {
+        let ended = |fault, arm_error| ControllerEvent::Stopped {
+            fault,
+            cycle: 1,
+            arm_error,
+            message: String::new(),
+        };
+        let met = |end: &ControllerEvent| [Way::Brake, Way::State4].map(|way| way.is_met_by(end));
+        assert_eq!(met(&ended(FaultCode::OperatorStop, 0)), [true, false]);
+        assert_eq!(met(&ended(FaultCode::ArmModeChanged, 0)), [false, true]);
+        assert_eq!(met(&ended(FaultCode::ArmNotReady, 0)), [false, true]);
+        for end in [
+            ended(FaultCode::DeadManReleased, 0),
+            ended(FaultCode::JointStuck, 0),
+            ended(FaultCode::OperatorStop, 31),
+            ended(FaultCode::ArmNotReady, 31),
+            ControllerEvent::Done,
+        ] {
+            assert_eq!(met(&end), [false, false], "{end:?}");
+        }
+    }
 }
