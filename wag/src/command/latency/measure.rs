@@ -62,10 +62,17 @@ pub(super) fn measure(
     args: &LatencyArgs,
     conclude: impl FnOnce(&Evidence) -> anyhow::Result<Value>,
 ) -> Outcome<Value> {
+    // Wrong input is refused before anything is connected; the limits of a running controller
+    // are not known before.
+    let local = args.arm.controller.is_none();
+    let intended = local.then(|| intent(args, None)).transpose()?;
     let Some(address) = reach(&args.arm)? else {
         return Err(bad_input!("name the arm with --arm ADDR"));
     };
-    let (limits, excitation, sweeps) = intent(args, Some(&address))?;
+    let (limits, excitation, sweeps) = match intended {
+        Some(intended) => intended,
+        None => intent(args, Some(&address))?,
+    };
     require_clear_area(&args.arm, &address, "MOVE")?;
     let is_asked = asks(&args.arm, &address);
     let Some((_, first)) = sweeps.first() else {
