@@ -1,7 +1,7 @@
 //! `wag latency` on a simulated arm with a secret, over sockets, and again from
 //! the run it recorded.
 
-use super::support::json_in;
+use super::support::{alone, json_in};
 use super::{Errors, report, secret_lags};
 use arm_model::{ArmResponse, JOINTS};
 use rand::SeedableRng;
@@ -40,6 +40,7 @@ fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
 
 #[test]
 fn a_secret_arm_is_measured_over_sockets_and_again_from_the_run() {
+    let _alone = alone();
     let secrets = secret_lags(&mut ChaCha8Rng::seed_from_u64(77));
     let arm = SimulatedArm::start(ArmConfig {
         command_port: 0,

@@ -1,11 +1,12 @@
 //! `wag latency --stops` on a simulated arm.
 
-use super::support::{json_in, refused_in};
+use super::support::{alone, json_in, refused_in};
 use std::path::Path;
 use xarm_sim::{ArmConfig, SimulatedArm};
 
 #[test]
 fn stops_are_measured_at_rising_speeds_by_the_brake_and_by_the_arm() {
+    let _alone = alone();
     let arm = SimulatedArm::start(ArmConfig {
         command_port: 0,
         report_ports: [0; 4],
