@@ -112,8 +112,7 @@ impl RigConfig {
 
     /// The drawn room, where one was chosen: with the camera's own noise, and with a plain
     /// rope where its colours are given.
-    #[must_use]
-    pub fn drawn_room(&self) -> Option<Room> {
+    pub(crate) fn drawn_room(&self) -> Option<Room> {
         let mut room = match self.room {
             RoomChoice::Plain => return None,
             RoomChoice::Ordinary => Room::draw(self.seed, Kind::Ordinary),

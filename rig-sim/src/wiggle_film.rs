@@ -38,8 +38,7 @@ pub fn joints(t_s: f64) -> JointVector {
 }
 
 /// The attach frame of the shipped wiggle at a time (s).
-#[must_use]
-pub fn attach(t_s: f64) -> FrameMotion {
+pub(crate) fn attach(t_s: f64) -> FrameMotion {
     attach_of(joints, t_s)
 }
 

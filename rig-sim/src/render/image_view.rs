@@ -5,7 +5,7 @@ use shared_types::{Intrinsics, StereoCamera};
 
 /// One eye of a stereo camera at its place in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ImageView {
+pub(super) struct ImageView {
     intrinsics: Intrinsics,
     r_cam_w: Matrix3<f64>,
     t_cam_m: Vector3<f64>,
@@ -26,8 +26,7 @@ pub(super) struct Seen {
 
 impl ImageView {
     /// Left eye.
-    #[must_use]
-    pub fn left(camera: &StereoCamera) -> Self {
+    pub(super) fn left(camera: &StereoCamera) -> Self {
         let r_cam_w = camera.r_w_cam.transpose();
         Self {
             intrinsics: camera.left,
@@ -39,8 +38,7 @@ impl ImageView {
     }
 
     /// Right eye.
-    #[must_use]
-    pub fn right(camera: &StereoCamera) -> Self {
+    pub(super) fn right(camera: &StereoCamera) -> Self {
         let left = Self::left(camera);
         Self {
             intrinsics: camera.right,
@@ -51,14 +49,12 @@ impl ImageView {
     }
 
     /// Columns and rows of this eye's picture.
-    #[must_use]
-    pub fn size_px(&self) -> (usize, usize) {
+    pub(super) fn size_px(&self) -> (usize, usize) {
         (self.width_px as usize, self.height_px as usize)
     }
 
     /// Raw pixel of a world point; `None` behind the camera.
-    #[must_use]
-    pub fn project(&self, p_w_m: &Vector3<f64>) -> Option<[f64; 2]> {
+    pub(super) fn project(&self, p_w_m: &Vector3<f64>) -> Option<[f64; 2]> {
         self.see(p_w_m).map(|seen| seen.pixel)
     }
 

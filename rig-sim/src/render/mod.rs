@@ -40,5 +40,4 @@ pub(crate) mod weave;
 pub use appearance::Appearance;
 pub(crate) use bodies::centreline;
 pub use bodies::{RopeShape, ScenePose};
-pub use image_view::ImageView;
 pub use scene::Renderer;

@@ -81,8 +81,7 @@ impl Renderer {
 
     /// Prepares both eyes in a drawn room, which has a surface for the rope and noise of
     /// its own; casting it takes a few seconds.
-    #[must_use]
-    pub fn in_room(
+    pub(crate) fn in_room(
         camera: &StereoCamera,
         cell: &Cell,
         shape: RopeShape,

@@ -128,8 +128,7 @@ impl Room {
     }
 
     /// The main colours of what is seen in it, with the target's.
-    #[must_use]
-    pub fn appearance(&self, target_rgb: [u8; 3]) -> Appearance {
+    pub(crate) fn appearance(&self, target_rgb: [u8; 3]) -> Appearance {
         Appearance {
             rope_rgb: self.rope.rope.rgb,
             lead_rgb: self.rope.tip.rgb,

@@ -41,8 +41,7 @@ impl Picture {
     }
 
     /// Brightness at a time (s), 1 on average.
-    #[must_use]
-    pub fn gain(&self, t_s: f64) -> f64 {
+    pub(crate) fn gain(&self, t_s: f64) -> f64 {
         let wave = |[part, hz]: [f64; 2]| part * (core::f64::consts::TAU * hz * t_s).sin();
         let [part, period_s] = self.drift;
         1.0 + wave([part, 1.0 / period_s]) + wave(self.flicker)

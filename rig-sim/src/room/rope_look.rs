@@ -28,8 +28,7 @@ pub struct RopeSurface {
 
 impl RopeSurface {
     /// A rope and a tip weight of one colour each (8-bit video RGB).
-    #[must_use]
-    pub fn plain(rope_rgb: [u8; 3], tip_rgb: [u8; 3]) -> Self {
+    pub(crate) fn plain(rope_rgb: [u8; 3], tip_rgb: [u8; 3]) -> Self {
         let given = |rgb| Named { name: "given", rgb };
         Self {
             rope: given(rope_rgb),
