@@ -25,9 +25,9 @@ pub(super) fn run(
     record: &Record,
     stop: &AtomicBool,
 ) -> Result<(), RigError> {
-    let mut physics = None;
+    let mut physics: Option<Physics> = None;
     while !stop.load(Ordering::Acquire) {
-        let after = physics.as_ref().map_or(MonotonicNs(0), Physics::reached);
+        let after = physics.as_ref().map_or(MonotonicNs(0), |p| p.last.at);
         let samples = arm.since(after);
         let mut rest = samples.iter();
         if physics.is_none()
@@ -62,10 +62,6 @@ impl Physics {
             start: first.at,
             last: *first,
         })
-    }
-
-    fn reached(&self) -> MonotonicNs {
-        self.last.at
     }
 
     /// Moves on to the next sample of the arm.

@@ -214,7 +214,7 @@ impl Renderer {
             for (v, row) in (first..).zip(band.chunks_exact_mut(row_bytes)) {
                 let halves = row.chunks_exact_mut(width * 2);
                 for ((canvas, spells), half) in self.images.iter_mut().zip(&spells).zip(halves) {
-                    let covers = self.shadows.covers();
+                    let covers = &self.shadows.covers;
                     self.drawn_px += canvas.draw_row(v, spells, covers, |i| weight_of(v, i), half);
                 }
             }

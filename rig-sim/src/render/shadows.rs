@@ -9,10 +9,11 @@ const ROPES: usize = 4;
 /// What each lamp's light meets on its way.
 #[derive(Debug)]
 pub(super) struct Shadows {
-    pub(super) views: Vec<LampView>,
+    views: Vec<LampView>,
     /// All but the rope, which hardly moves during a frame.
     still: Vec<Cover>,
-    covers: Vec<Cover>,
+    /// Each lamp's covers, as last cast.
+    pub(super) covers: Vec<Cover>,
     rope: Cover,
 }
 
@@ -24,11 +25,6 @@ impl Shadows {
             rope: Cover::empty(),
             views,
         }
-    }
-
-    /// Each lamp's covers, as last cast.
-    pub(super) fn covers(&self) -> &[Cover] {
-        &self.covers
     }
 
     /// Begins a frame of the sub-frames `poses`.
