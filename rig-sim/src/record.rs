@@ -154,11 +154,8 @@ impl Record {
             peak_tip_speed_m_s: 0.0,
             touched: false,
         };
-        for (a, b) in kept
-            .tips
-            .range(begin..end)
-            .zip(kept.tips.range(begin + 1..end))
-        {
+        let next = kept.tips.range(begin + 1..end);
+        for (a, b) in kept.tips.range(begin..end).zip(next) {
             truth.add(a, b, &target, (from, to));
         }
         Ok(truth)

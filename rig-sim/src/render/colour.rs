@@ -17,9 +17,5 @@ pub(crate) fn lit([y, cb, cr]: Ycc, shade: f32, gloss: f32) -> Ycc {
 
 /// Linear mixture, `u` of the second colour.
 pub(crate) fn mix(a: Ycc, b: Ycc, u: f32) -> Ycc {
-    [
-        a[0] + u * (b[0] - a[0]),
-        a[1] + u * (b[1] - a[1]),
-        a[2] + u * (b[2] - a[2]),
-    ]
+    core::array::from_fn(|i| a[i] + u * (b[i] - a[i]))
 }
