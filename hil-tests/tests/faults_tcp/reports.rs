@@ -75,19 +75,12 @@ fn fault_17_broken_reports_are_dropped_and_too_many_in_a_row_slow_the_motion() {
 }
 
 /// The bring-up is refused with words that say why, and nothing is brought up.
-fn refuses_to_bring_up(
-    mut stand: Stand,
-    expected: FaultCode,
-    words: &[&str],
-    then: impl FnOnce(&Stand),
-) {
+fn refuses_to_bring_up(stand: &mut Stand, expected: FaultCode, words: &[&str]) {
     let (fault, message) = stand.refused(&ControllerRequest::Bringup);
     assert_eq!(fault, expected, "{message}");
     assert!(words.iter().all(|w| message.contains(w)), "{message}");
     let refused = stand.refused(&ControllerRequest::Acknowledge);
     assert_eq!(refused.0, FaultCode::WrongMode, "nothing was brought up");
-    then(&stand);
-    stand.finish();
 }
 
 #[test]
@@ -96,8 +89,9 @@ fn fault_18_a_firmware_without_the_reports_needed_is_refused() {
         firmware: Firmware(1, 12, 0),
         ..ArmConfig::default()
     };
-    let stand = Stand::with("old", old, |_| ());
-    refuses_to_bring_up(stand, FaultCode::UnsupportedFirmware, &["v1.12.0"], |_| ());
+    let mut stand = Stand::with("old", old, |_| ());
+    refuses_to_bring_up(&mut stand, FaultCode::UnsupportedFirmware, &["v1.12.0"]);
+    stand.finish();
 }
 
 /// A line between controller and arm that passes everything on, with a `lie`. Its port.
@@ -136,15 +130,12 @@ fn fault_18_reports_of_another_layout_than_the_firmwares_are_refused() {
             bytes[at..at + 6].copy_from_slice(b"v2.8.2");
         }
     }
-    let stand = Stand::with("liar", ArmConfig::default(), |config| {
+    let mut stand = Stand::with("liar", ArmConfig::default(), |config| {
         config.command_port = a_line_that_lies(config.command_port, newer);
     });
-    refuses_to_bring_up(
-        stand,
-        FaultCode::UnsupportedFirmware,
-        &["v2.8.2", "574", "587"],
-        |_| (),
-    );
+    let words = ["v2.8.2", "574", "587"];
+    refuses_to_bring_up(&mut stand, FaultCode::UnsupportedFirmware, &words);
+    stand.finish();
 }
 
 /// The arm takes a new speed limit and then says that it has none.
@@ -156,11 +147,12 @@ fn a_speed_limit_that_is_no_number_is_not_set() {
             bytes[8..].copy_from_slice(&f32::NAN.to_le_bytes());
         }
     }
-    let stand = Stand::with("nan", ArmConfig::default(), |config| {
+    let mut stand = Stand::with("nan", ArmConfig::default(), |config| {
         config.on_difference = OnDifference::Set;
         config.command_port = a_line_that_lies(config.command_port, no_number);
     });
-    refuses_to_bring_up(stand, FaultCode::ArmDiffers, &["1.320", "NaN"], |_| ());
+    refuses_to_bring_up(&mut stand, FaultCode::ArmDiffers, &["1.320", "NaN"]);
+    stand.finish();
 }
 
 #[test]
@@ -170,24 +162,21 @@ fn an_arm_that_does_not_prove_to_be_simulated_is_not_driven_as_one() {
             bytes[at..at + 9].copy_from_slice(b"XS1305000");
         }
     }
-    let stand = Stand::with("tunnel", ArmConfig::default(), |config| {
+    let mut stand = Stand::with("tunnel", ArmConfig::default(), |config| {
         config.command_port = a_line_that_lies(config.command_port, real);
     });
     let words = ["does not prove", "simulated = true"];
-    refuses_to_bring_up(stand, FaultCode::ArmDiffers, &words, |_| ());
+    refuses_to_bring_up(&mut stand, FaultCode::ArmDiffers, &words);
+    stand.finish();
 }
 
 #[test]
 fn fault_18_another_report_on_the_port_of_the_joint_reports_is_refused() {
-    let stand = Stand::with("ports", ArmConfig::default(), |config| {
+    let mut stand = Stand::with("ports", ArmConfig::default(), |config| {
         config.report_port = config.fallback_report_port;
     });
-    refuses_to_bring_up(
-        stand,
-        FaultCode::UnsupportedFirmware,
-        &["135", "784"],
-        |_| (),
-    );
+    refuses_to_bring_up(&mut stand, FaultCode::UnsupportedFirmware, &["135", "784"]);
+    stand.finish();
 }
 
 /// Changes the byte of a status report at `at`.
@@ -232,16 +221,16 @@ fn an_arm_is_brought_up_by_what_it_reports_and_one_that_is_refused_is_not_left_r
         ),
     ];
     for (lie, fault, words) in lies {
-        let stand = Stand::with("effect", ArmConfig::default(), |config| {
+        let mut stand = Stand::with("effect", ArmConfig::default(), |config| {
             config.on_difference = OnDifference::Set;
             config.arm_settings.collision_sensitivity = Some(4);
             config.status_ports[0] = a_line_that_lies(config.status_ports[0], lie);
         });
         let arm = (stand.config.arm, stand.config.command_port).into();
         let mut beside = ArmSession::connect(arm, PATIENCE).unwrap();
-        refuses_to_bring_up(stand, fault, words, |_| {
-            let state = beside.state().unwrap();
-            assert!(!state.can_move(), "{state:?} after {words:?}");
-        });
+        refuses_to_bring_up(&mut stand, fault, words);
+        let state = beside.state().unwrap();
+        assert!(!state.can_move(), "{state:?} after {words:?}");
+        stand.finish();
     }
 }
