@@ -1,12 +1,10 @@
 //! Somebody else commands the arm.
 
 use super::stand::{PATIENCE, Stand};
-use rt_controller::session::ArmSession;
 use rt_controller::xarm::Command;
 use shared_types::FaultCode;
 use shared_types::ipc::message::ControllerEvent;
-use std::net::{Ipv4Addr, SocketAddr};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 #[test]
 fn fault_13_replies_to_commands_never_sent_mean_a_second_commander() {
@@ -21,8 +19,7 @@ fn fault_13_replies_to_commands_never_sent_mean_a_second_commander() {
 #[test]
 fn fault_13_a_second_program_that_streams_is_noticed() {
     let mut stand = Stand::ready("second");
-    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, stand.config.command_port));
-    let mut second = ArmSession::connect(address, Duration::from_secs(5)).unwrap();
+    let mut second = stand.other_client();
     second.ask(&Command::FeedbackCheck).unwrap();
     let held = stand.commanded();
     let pending = stand.begin();

@@ -1,10 +1,9 @@
 //! The joint reports: silent, frozen, out of time, truncated, no numbers; and arms
 //! whose reports have another layout.
 
-use super::stand::{PATIENCE, Stand};
+use super::stand::Stand;
 use rt_controller::ControllerConfig;
 use rt_controller::config::OnDifference;
-use rt_controller::session::ArmSession;
 use shared_types::FaultCode;
 use shared_types::ipc::message::ControllerRequest;
 use std::io::{Read, Write};
@@ -226,8 +225,7 @@ fn an_arm_is_brought_up_by_what_it_reports_and_one_that_is_refused_is_not_left_r
             config.arm_settings.collision_sensitivity = Some(4);
             config.status_ports[0] = a_line_that_lies(config.status_ports[0], lie);
         });
-        let arm = (stand.config.arm, stand.config.command_port).into();
-        let mut beside = ArmSession::connect(arm, PATIENCE).unwrap();
+        let mut beside = stand.other_client();
         refuses_to_bring_up(&mut stand, fault, words);
         let state = beside.state().unwrap();
         assert!(!state.can_move(), "{state:?} after {words:?}");

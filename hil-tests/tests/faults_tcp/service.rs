@@ -7,7 +7,6 @@ use hil_tests::scenario::entry;
 use rt_controller::arm_settings::Load;
 use rt_controller::commander::CommanderLock;
 use rt_controller::config::OnDifference;
-use rt_controller::session::ArmSession;
 use rt_controller::xarm::report::{NormalReport, RICH_REPORT_LEN};
 use rt_controller::xarm::{Command, Mode, ReplyData};
 use shared_types::ipc::ControllerMode;
@@ -168,8 +167,7 @@ fn the_arms_own_speed_limit_has_headroom_or_is_set() {
             config.on_difference = on_difference;
         });
         stand.make_ready();
-        let address = (stand.config.arm, stand.config.command_port).into();
-        let mut other = ArmSession::connect(address, PATIENCE).unwrap();
+        let mut other = stand.other_client();
         let found = match other.ask(&Command::GetSpeedLimitFactor).unwrap() {
             ReplyData::SpeedLimitFactor(found) => found,
             other => panic!("{other:?}"),
@@ -190,9 +188,7 @@ fn the_arms_own_speed_limit_has_headroom_or_is_set() {
 #[test]
 fn an_arm_set_otherwise_than_configured_is_refused_or_set() {
     let change = |stand: &Stand, command| {
-        let address = (stand.config.arm, stand.config.command_port).into();
-        let mut other = ArmSession::connect(address, PATIENCE).unwrap();
-        other.ask(&command).unwrap();
+        stand.other_client().ask(&command).unwrap();
     };
     let load = |mass_kg| Command::TcpLoad {
         mass_kg,
@@ -283,8 +279,7 @@ fn a_bring_up_is_done_when_the_arms_reports_count() {
         }
     }
     // Somebody takes the arm out of its mode before anything could tell.
-    let arm = (stand.config.arm, stand.config.command_port).into();
-    let mut other = ArmSession::connect(arm, PATIENCE).unwrap();
+    let mut other = stand.other_client();
     other.ask(&Command::SetMode(Mode::Position)).unwrap();
     match stand.answer(&bring_up) {
         // Replies to setpoints may tell it before the reports do.

@@ -9,6 +9,7 @@ use rt_controller::ControllerConfig;
 use rt_controller::config::{GuardianSettings, Profile, ThresholdSettings};
 use rt_controller::os::RealTimeSettings;
 use rt_controller::recording::{Item, LogReader, Read};
+use rt_controller::session::ArmSession;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, ChunkSubscriber, ControllerMode, DomainSweep, OperatorEnd};
@@ -218,6 +219,12 @@ impl Stand {
         self.controller = Process::start(Role::Controller, "again", &text);
         let (operator, client) = meet(&self.bus, &self.controller);
         (self.operator, self.client) = (Some(operator), client);
+    }
+
+    /// Somebody else's connection to the arm.
+    pub fn other_client(&self) -> ArmSession {
+        let arm = (self.config.arm, self.config.command_port).into();
+        ArmSession::connect(arm, PATIENCE).unwrap()
     }
 
     /// Turns for some time.
