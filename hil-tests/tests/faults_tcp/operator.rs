@@ -83,13 +83,11 @@ fn an_arming_wants_a_fresh_confirmation_given_to_an_arm_at_rest() {
         }
     }
     // What is armed has not begun yet, and moves elsewhere: the confirmation was for here.
-    let arm_for_a_throw = || arm_for(OperatingMode::Throw, Some(clock::now()));
-    assert_eq!(stand.ask(&arm_for_a_throw()), ControllerEvent::Done);
+    assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
     let mut q = stand.commanded();
     q[6] += 0.1;
     let speed_fraction = 0.1;
-    let moved = stand.call(&ControllerRequest::MoveTo { q, speed_fraction });
-    stand.finishes(&moved);
+    stand.moves(&ControllerRequest::MoveTo { q, speed_fraction });
     let swing = stand.swing_here();
     let (fault, message) = stand.refused(&swing);
     assert_eq!(fault, FaultCode::NotArmed);

@@ -14,7 +14,7 @@ use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::{FaultCode, OperatingMode};
 use std::io::Read;
 use std::net::TcpStream;
-use xarm_sim::{ArmConfig, clock};
+use xarm_sim::ArmConfig;
 
 #[test]
 fn motions_need_a_bring_up_and_an_arming_and_a_throw_is_armed_once() {
@@ -44,8 +44,7 @@ fn motions_need_a_bring_up_and_an_arming_and_a_throw_is_armed_once() {
         other => panic!("{other:?}"),
     }
     for pose in [aside, START_POSE] {
-        let pending = stand.call(&move_to(pose));
-        stand.finishes(&pending);
+        stand.moves(&move_to(pose));
         assert!((stand.commanded() - pose).max_abs() < 1e-6);
     }
     assert_eq!(stand.ask(&ControllerRequest::Disarm), ControllerEvent::Done);
@@ -109,8 +108,7 @@ fn another_commander_or_another_tool_speed_is_a_refusal_that_says_what() {
 /// The loop would brake it on its way.
 #[test]
 fn a_motion_faster_than_it_is_armed_for_is_refused_before_it_begins() {
-    let mut stand = Stand::start("armed_speed");
-    stand.make_ready();
+    let mut stand = Stand::ready("armed_speed");
     let mut aside = START_POSE;
     aside[0] += 0.6;
     let there_and_back = [START_POSE, aside, START_POSE];
@@ -126,10 +124,7 @@ fn a_motion_faster_than_it_is_armed_for_is_refused_before_it_begins() {
         (OperatingMode::Wiggle, &swung),
         (OperatingMode::SetUp, &pole),
     ] {
-        assert_eq!(
-            stand.ask(&arm_for(armed, Some(clock::now()))),
-            ControllerEvent::Done
-        );
+        assert_eq!(stand.arm_for(armed), ControllerEvent::Done);
         let (fault, message) = stand.refused(request);
         assert_eq!(fault, FaultCode::OperatingModeExceeded, "{message}");
         assert!(
@@ -138,14 +133,8 @@ fn a_motion_faster_than_it_is_armed_for_is_refused_before_it_begins() {
         );
         assert_eq!(stand.mode(), ControllerMode::Idle);
     }
-    assert_eq!(
-        stand.ask(&arm_for(OperatingMode::Throw, Some(clock::now()))),
-        ControllerEvent::Done
-    );
-    match stand.ask(&swung) {
-        ControllerEvent::Finished { .. } => {}
-        other => panic!("{other:?}"),
-    }
+    assert_eq!(stand.arm_for(OperatingMode::Throw), ControllerEvent::Done);
+    stand.moves(&swung);
     stand.finish();
 }
 
@@ -160,13 +149,12 @@ fn the_arms_own_speed_limit_has_headroom_or_is_set() {
         (0.7, OnDifference::Set, 0.77, false),
         (1.2, OnDifference::Set, 1.32, false),
     ] {
-        let mut stand = Stand::with("headroom", ArmConfig::default(), |config| {
+        let mut stand = Stand::ready_with("headroom", |config| {
             let mut spec = LimitsSpec::from(Limits::default());
             spec.tcp_speed_max_m_s = configured_m_s;
             config.limits = Some(spec.try_into().unwrap());
             config.on_difference = on_difference;
         });
-        stand.make_ready();
         let mut other = stand.other_client();
         let found = match other.ask(&Command::GetSpeedLimitFactor).unwrap() {
             ReplyData::SpeedLimitFactor(found) => found,
@@ -215,7 +203,7 @@ fn an_arm_set_otherwise_than_configured_is_refused_or_set() {
     stand.make_ready();
     stand.finish();
 
-    let mut stand = Stand::with("settings_set", ArmConfig::default(), |config| {
+    let stand = Stand::ready_with("settings_set", |config| {
         config.on_difference = OnDifference::Set;
         config.arm_settings.load = Some(Load {
             mass_kg: 0.5,
@@ -223,7 +211,6 @@ fn an_arm_set_otherwise_than_configured_is_refused_or_set() {
         });
         config.arm_settings.collision_sensitivity = Some(4);
     });
-    stand.make_ready();
     let mut port = TcpStream::connect((stand.config.arm, stand.config.status_ports[0])).unwrap();
     port.set_read_timeout(Some(PATIENCE)).unwrap();
     let mut report = [0; RICH_REPORT_LEN];
@@ -270,22 +257,16 @@ fn a_bring_up_is_done_when_the_arms_reports_count() {
     ];
     let early = early.map(|request| stand.call(&request));
     for pending in early {
-        match stand.answer(&pending) {
-            ControllerEvent::Refused { fault, message } => {
-                assert_eq!(fault, FaultCode::WrongMode);
-                assert!(message.contains("bring-up is under way"), "{message}");
-            }
-            other => panic!("not refused: {other:?}"),
-        }
+        let (fault, message) = stand.refuses(&pending);
+        assert_eq!(fault, FaultCode::WrongMode);
+        assert!(message.contains("bring-up is under way"), "{message}");
     }
     // Somebody takes the arm out of its mode before anything could tell.
     let mut other = stand.other_client();
     other.ask(&Command::SetMode(Mode::Position)).unwrap();
-    match stand.answer(&bring_up) {
-        // Replies to setpoints may tell it before the reports do.
-        ControllerEvent::Refused { fault, .. } if LEFT.contains(&fault) => {}
-        answer => panic!("not refused: {answer:?}"),
-    }
+    // Replies to setpoints may tell it before the reports do.
+    let (fault, message) = stand.refuses(&bring_up);
+    assert!(LEFT.contains(&fault), "{fault:?}: {message}");
     stand.expect(&LEFT);
     stand.finish();
 }
@@ -297,13 +278,11 @@ fn the_poles_end_keeps_the_speed_that_a_move_is_armed_for() {
         let mut stand = Stand::ready("pole_speed");
         let mut turned = START_POSE;
         (turned[0], turned[5]) = (turned[0] + 0.5, turned[5] - 0.9);
-        let arming = arm_for(armed, Some(clock::now()));
-        assert_eq!(stand.ask(&arming), ControllerEvent::Done);
-        let pending = stand.call(&ControllerRequest::MoveTo {
+        assert_eq!(stand.arm_for(armed), ControllerEvent::Done);
+        stand.moves(&ControllerRequest::MoveTo {
             q: turned,
             speed_fraction: 1.0,
         });
-        stand.finishes(&pending);
         let pole = stand.config.pole;
         let top_m_s = stand.finish().pole_top_m_s(&pole);
         assert!(

@@ -271,7 +271,13 @@ impl Stand {
 
     /// Asks for what must be refused; the fault and the words.
     pub fn refused(&mut self, request: &ControllerRequest) -> (FaultCode, String) {
-        match self.ask(request) {
+        let pending = self.call(request);
+        self.refuses(&pending)
+    }
+
+    /// What was asked for is refused; the fault and the words.
+    pub fn refuses(&mut self, pending: &Pending<ControllerRpc>) -> (FaultCode, String) {
+        match self.answer(pending) {
             ControllerEvent::Refused { fault, message } => (fault, message),
             other => panic!("not refused: {other:?}"),
         }
@@ -404,6 +410,12 @@ impl Stand {
         self.finishes(&pending)
     }
 
+    /// Asks for a motion, which goes on to its end.
+    pub fn moves(&mut self, request: &ControllerRequest) {
+        let pending = self.call(request);
+        self.finishes(&pending);
+    }
+
     /// A motion goes on to its end; when that was (ns).
     pub fn finishes(&mut self, pending: &Pending<ControllerRpc>) -> [u64; 2] {
         match self.answer(pending) {
@@ -417,8 +429,7 @@ impl Stand {
         self.make_ready();
         let once = swings(self.commanded(), 1);
         assert_eq!(self.arm_for(OperatingMode::Throw), ControllerEvent::Done);
-        let pending = self.call(&execute(&once));
-        self.finishes(&pending);
+        self.moves(&execute(&once));
     }
 
     /// Works again, and that was all.
