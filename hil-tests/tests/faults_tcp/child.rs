@@ -45,28 +45,15 @@ pub struct Process {
 impl Process {
     /// Starts a child that logs into a file named after `name` and its role.
     pub fn start(role: Role, name: &str, config: &str) -> Self {
-        Self::spawn(role, name, config, |_| ()).unwrap()
+        Self::of(this_program(), role, name, config).unwrap()
     }
 
     /// The same as another user; `None` when that user may not run this program.
     pub fn start_as_nobody(role: Role, name: &str, config: &str) -> Option<Self> {
         const NOBODY: u32 = 65_534;
-        Self::spawn(role, name, config, |c| {
-            c.uid(NOBODY).gid(NOBODY);
-        })
-        .ok()
-    }
-
-    fn spawn(
-        role: Role,
-        name: &str,
-        config: &str,
-        change: impl FnOnce(&mut Command),
-    ) -> std::io::Result<Self> {
-        let mut command = Command::new(std::env::current_exe()?);
-        command.args(["--exact", CHILD, "--nocapture"]);
-        change(&mut command);
-        Self::of(command, role, name, config)
+        let mut command = this_program();
+        command.uid(NOBODY).gid(NOBODY);
+        Self::of(command, role, name, config).ok()
     }
 
     /// Starts the controller where shared memory has room for 16 MB only; `None`
@@ -141,6 +128,12 @@ impl Drop for Process {
     fn drop(&mut self) {
         self.end();
     }
+}
+
+fn this_program() -> Command {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command.args(["--exact", CHILD, "--nocapture"]);
+    command
 }
 
 /// Not a test by itself, where no environment says what to be.

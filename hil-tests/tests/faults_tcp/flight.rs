@@ -18,8 +18,8 @@ const FEEDBACK_CHECK: ArmEvent = ArmEvent::Request { register: 253 };
 /// Everything that is known about the time of a stand.
 #[derive(Debug, Default)]
 pub struct Flight {
-    limits: Limits,
-    interface: CommandInterface,
+    pub limits: Limits,
+    pub interface: CommandInterface,
     /// Every control cycle, in order.
     pub cycles: Vec<RecordedCycle>,
     /// Every record of a cause.
@@ -28,29 +28,13 @@ pub struct Flight {
     pub arm: Vec<TimedEvent>,
     /// True joint motion, 1 kHz.
     pub truth: Vec<JointSample>,
-    expected: Vec<Vec<FaultCode>>,
-    at_rest: Vec<(MonotonicNs, MonotonicNs)>,
+    /// For each stop, in order, the faults of which one must be its cause.
+    pub expected: Vec<Vec<FaultCode>>,
+    /// Times in which the arm must have stood still.
+    pub at_rest: Vec<(MonotonicNs, MonotonicNs)>,
 }
 
 impl Flight {
-    pub fn new(limits: Limits, interface: CommandInterface) -> Self {
-        Self {
-            limits,
-            interface,
-            ..Self::default()
-        }
-    }
-
-    /// A stop for one of `faults` must have been recorded next.
-    pub fn expect(&mut self, faults: &[FaultCode]) {
-        self.expected.push(faults.to_vec());
-    }
-
-    /// The arm must have stood still in this time.
-    pub fn at_rest_between(&mut self, from: MonotonicNs, to: MonotonicNs) {
-        self.at_rest.push((from, to));
-    }
-
     /// Sum of a count over all cycles.
     pub fn total(&self, count: impl Fn(&RecordedCycle) -> u32) -> u32 {
         self.cycles.iter().map(count).sum()

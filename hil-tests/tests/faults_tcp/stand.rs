@@ -180,7 +180,11 @@ impl Stand {
             chunks,
             controller,
             guardian,
-            flight: Flight::new(config.resolve_limits().unwrap(), config.command_interface),
+            flight: Flight {
+                limits: config.resolve_limits().unwrap(),
+                interface: config.command_interface,
+                ..Flight::default()
+            },
             arm,
             bus,
             config,
@@ -377,7 +381,7 @@ impl Stand {
             panic!("not stopped: {answer:?}");
         };
         assert!(expected.contains(&fault), "{answer:?}");
-        self.flight.expect(expected);
+        self.expect(expected);
         self.is_latched();
         answer
     }
@@ -401,7 +405,7 @@ impl Stand {
         self.rest(Duration::from_millis(700));
         let from_ns = clock::now();
         self.rest(Duration::from_millis(500));
-        self.flight.at_rest_between(from_ns, clock::now());
+        self.flight.at_rest.push((from_ns, clock::now()));
     }
 
     /// Arms and swings to the end; when that was (ns).
@@ -438,16 +442,16 @@ impl Stand {
         self.finish()
     }
 
-    /// The stop expected next, made by something else than a script.
+    /// The next stop is one for one of `faults`.
     pub fn expect(&mut self, faults: &[FaultCode]) {
-        self.flight.expect(faults);
+        self.flight.expected.push(faults.to_vec());
     }
 
     /// Ends all processes in order and hands over what was recorded, checked.
     pub fn finish(mut self) -> Flight {
         if self.mode() == ControllerMode::Idle {
             // Its end is one more stop, of an arm that stands.
-            self.flight.expect(&[FaultCode::OperatorStop]);
+            self.expect(&[FaultCode::OperatorStop]);
         }
         self.controller.end();
         if let Some(guardian) = &mut self.guardian {
