@@ -25,7 +25,7 @@ fn a_stall_freezes_the_arm_and_then_lets_everything_go_at_once() {
     let counters = b.arm.model().counters();
     assert!((46..=48).contains(&counters.dropped), "{counters:?}");
     b.wait(0.3);
-    assert!((b.truth().q[6] - 0.5).abs() < 1e-6);
+    assert!((b.arm.model().true_motion().q[6] - 0.5).abs() < 1e-6);
     assert_eq!(b.errors(), [0; 0]);
 }
 
@@ -53,10 +53,7 @@ fn resets_half_open_links_and_pulled_cables_differ_for_the_client() {
     // A pulled cable: silence everywhere, no new connection, then a reset.
     let script = entry("on = 'setpoint:10'", "cable_pull, duration_s = 0.5");
     let mut b = Scenario::new(&script);
-    let reports = b
-        .arm
-        .connect(Service::Reports(ReportKind::Realtime), b.now)
-        .unwrap();
+    let reports = b.reports(ReportKind::Realtime);
     b.bring_up(Mode::Servo);
     b.replies.clear();
     b.stream(0.1, 0.1);

@@ -9,10 +9,7 @@ use xarm_sim::{ArmConfig, Firmware, ReportKind, Service};
 /// Real-time reports of a run with a fault at 0.5 s, as bytes, by arrival (ms).
 fn reports(kind: &str) -> Vec<(u64, Vec<u8>)> {
     let mut b = Scenario::new(&entry("at_s = 0.5", kind));
-    let client = b
-        .arm
-        .connect(Service::Reports(ReportKind::Realtime), b.now)
-        .unwrap();
+    let client = b.reports(ReportKind::Realtime);
     b.bring_up(Mode::Servo);
     let mut seen = Vec::new();
     for _ in 0..250 {
@@ -106,14 +103,9 @@ fn firmware_decides_layouts_and_what_is_known() {
 
     // A change concerns new connections; the old ones keep their size.
     let mut b = Scenario::new(&entry("at_s = 0.1", "firmware_changed, version = '2.8.2'"));
-    let rich = |b: &mut Scenario| {
-        b.arm
-            .connect(Service::Reports(ReportKind::Rich), b.now)
-            .unwrap()
-    };
-    let old = rich(&mut b);
+    let old = b.reports(ReportKind::Rich);
     b.wait(0.3);
-    let new = rich(&mut b);
+    let new = b.reports(ReportKind::Rich);
     let len = |b: &mut Scenario, client| {
         let mut last = 0;
         while let Some(frame) = b.arm.take_frame(client, b.now) {

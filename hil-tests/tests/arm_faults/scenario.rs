@@ -1,11 +1,13 @@
 //! An arm in virtual time and a client of its command port.
 
-use arm_model::{JointState, JointVector};
+use arm_model::JointVector;
 use hil_tests::scenario::bring_up;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::{Command, ErrorCode, FrameReader, Mode, Protocol, Status};
 use shared_types::MonotonicNs;
-use xarm_sim::{ArmConfig, ArmEndpoint, ArmEvent, FaultScript, Service, TimedEvent};
+use xarm_sim::{
+    ArmConfig, ArmEndpoint, ArmEvent, FaultScript, ReportKind, Service, TimedEvent,
+};
 
 pub const START: MonotonicNs = MonotonicNs(7_000_000_000);
 pub const CYCLE_S: f64 = 0.004;
@@ -52,6 +54,11 @@ impl Scenario {
             events: Vec::new(),
             q,
         }
+    }
+
+    /// A client of a report port.
+    pub fn reports(&mut self, kind: ReportKind) -> u32 {
+        self.arm.connect(Service::Reports(kind), self.now).unwrap()
     }
 
     pub fn send(&mut self, command: &Command) {
@@ -105,10 +112,6 @@ impl Scenario {
     /// The status byte of the newest reply.
     pub fn status(&self) -> Status {
         Status(self.replies.last().unwrap().status)
-    }
-
-    pub fn truth(&self) -> JointState {
-        self.arm.model().true_motion()
     }
 
     pub fn errors(&self) -> Vec<u8> {
