@@ -55,29 +55,21 @@ impl Differences {
         let third = (second(0) - second(1)) * (3.0 / span(0, 3));
         let period_s = limits.period_s();
         for j in 0..JOINTS {
+            let joint = j + 1;
             let check = |what: &str, value: f64, most: f64, slack: f64| {
                 let most = most * (1.0 + 1e-9) + slack;
                 assert!(
                     value.abs() <= most,
-                    "joint {}: {what} {value} of {most}",
-                    j + 1
+                    "joint {joint}: {what} {value} of {most}"
                 );
             };
             let (low, high) = (limits.position_min_rad[j], limits.position_max_rad[j]);
-            check(
-                "position",
-                q[j] - 0.5 * (low + high),
-                0.5 * (high - low),
-                1e-6,
-            );
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+            check("position", q[j] - middle, half, 1e-6);
+            let fastest = limits.velocity_max_rad_s[j];
             let acceleration = limits.acceleration_max_rad_s2[j];
             let speed = first(0)[j] * span(0, 1) / gap_s;
-            check(
-                "speed",
-                speed,
-                limits.velocity_max_rad_s[j],
-                self.rounding[0],
-            );
+            check("speed", speed, fastest, self.rounding[0]);
             if self.jitter_s > 0.0 {
                 continue;
             }

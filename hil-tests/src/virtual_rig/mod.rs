@@ -158,12 +158,6 @@ impl VirtualRig {
         }
     }
 
-    /// The present.
-    #[must_use]
-    pub fn now(&self) -> MonotonicNs {
-        self.around.now()
-    }
-
     /// Mode of the controller.
     #[must_use]
     pub fn mode(&self) -> ControllerMode {

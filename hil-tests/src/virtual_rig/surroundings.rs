@@ -73,7 +73,9 @@ impl Surroundings {
         }
     }
 
-    pub(super) fn now(&self) -> MonotonicNs {
+    /// The present.
+    #[must_use]
+    pub fn now(&self) -> MonotonicNs {
         self.network.borrow().now
     }
 

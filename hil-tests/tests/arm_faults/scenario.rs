@@ -5,9 +5,7 @@ use hil_tests::scenario::bring_up;
 use rt_controller::xarm::frame::{MAX_FRAME_LEN, emit_command};
 use rt_controller::xarm::{Command, ErrorCode, FrameReader, Mode, Protocol, Status};
 use shared_types::MonotonicNs;
-use xarm_sim::{
-    ArmConfig, ArmEndpoint, ArmEvent, FaultScript, ReportKind, Service, TimedEvent,
-};
+use xarm_sim::{ArmConfig, ArmEndpoint, ArmEvent, FaultScript, ReportKind, Service, TimedEvent};
 
 pub const START: MonotonicNs = MonotonicNs(7_000_000_000);
 pub const CYCLE_S: f64 = 0.004;
