@@ -15,46 +15,31 @@ const STANDING_RAD_S: f64 = 1e-3;
 const STOP_WITHIN_S: f64 = 1.5;
 
 /// What a stop is expected to be: for which fault, how, and whether the arm is asked to stop.
-#[derive(Clone, Copy)]
-pub(crate) struct Stop {
-    fault: FaultCode,
-    path: StopCategory,
-    stop_arm: bool,
-}
-
-impl Stop {
-    const fn new(fault: FaultCode, path: StopCategory, stop_arm: bool) -> Self {
-        Self {
-            fault,
-            path,
-            stop_arm,
-        }
-    }
-}
+pub(crate) type Stop = (FaultCode, StopCategory, bool);
 
 /// Slowed along the path.
 pub(crate) const fn slowed(fault: FaultCode) -> Stop {
-    Stop::new(fault, StopCategory::OnPath, false)
+    (fault, StopCategory::OnPath, false)
 }
 
 /// Braked in joint space.
 pub(crate) const fn braked(fault: FaultCode) -> Stop {
-    Stop::new(fault, StopCategory::JointSpace, false)
+    (fault, StopCategory::JointSpace, false)
 }
 
 /// Braked, then the arm asked to stop.
 pub(crate) const fn braked_and_stopped(fault: FaultCode) -> Stop {
-    Stop::new(fault, StopCategory::JointSpace, true)
+    (fault, StopCategory::JointSpace, true)
 }
 
 /// No setpoints any more, the arm asked to stop.
 pub(crate) const fn stopped(fault: FaultCode) -> Stop {
-    Stop::new(fault, StopCategory::CutOff, true)
+    (fault, StopCategory::CutOff, true)
 }
 
 /// No setpoints any more; the arm has stopped by itself or cannot hear.
 pub(crate) const fn silenced(fault: FaultCode) -> Stop {
-    Stop::new(fault, StopCategory::CutOff, false)
+    (fault, StopCategory::CutOff, false)
 }
 
 /// A throw by each interface with a fault of a script: it stops as wanted, is noticed
@@ -91,8 +76,9 @@ impl Stage {
     /// the arm for two seconds, whatever is ordered; gives the cause.
     pub(crate) fn assert_stop(&mut self, want: Stop) -> CauseRecord {
         let cause = self.assert_one_cause(want);
+        let (_, path, stop_arm) = want;
         // What a dead link delivers later is no setpoint any more.
-        let wire_until = match want.path {
+        let wire_until = match path {
             StopCategory::CutOff => MonotonicNs(cause.stamp_ns),
             _ => EVER,
         };
@@ -101,7 +87,7 @@ impl Stage {
         self.assert_nothing_moves_it();
         let requests = self.state_requests_since(MonotonicNs(cause.stamp_ns));
         // A dead link may carry none.
-        assert!(requests <= usize::from(want.stop_arm), "{requests}");
+        assert!(requests <= usize::from(stop_arm), "{requests}");
         assert_eq!(
             self.rig.log.causes,
             [cause],
@@ -111,11 +97,7 @@ impl Stage {
     }
 
     fn assert_one_cause(&self, want: Stop) -> CauseRecord {
-        let Stop {
-            fault,
-            path,
-            stop_arm,
-        } = want;
+        let (fault, path, stop_arm) = want;
         let causes = &self.rig.log.causes;
         let [cause] = causes[..] else {
             panic!("{:?} {fault:?}: {causes:?}", self.via);
