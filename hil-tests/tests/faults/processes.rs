@@ -219,13 +219,12 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
     let reader = StateReader::open(&bus).unwrap();
     let control = ControlState::new(Limits::default(), Thresholds::strict());
     let mut all = rings();
-    let hold = ControlCommand::Engage { hold: START_POSE };
-    let link = Some(Box::new(IdealArm::default()));
-    let message = CommandMsg {
-        command: hold,
-        link,
+    let mut order = |command, link| {
+        let message = CommandMsg { command, link };
+        all.bridge.commands.push(message).unwrap();
     };
-    all.bridge.commands.push(message).unwrap();
+    let hold = ControlCommand::Engage { hold: START_POSE };
+    order(hold, Some(Box::new(IdealArm::default())));
     let now_ns = Rc::new(Cell::new(1_000_000_000_000));
     let clock = HandClock(Rc::clone(&now_ns));
     let mut real = RtLoop::new(control, clock, boards, all.rt);
@@ -248,12 +247,7 @@ fn loop_before(audience: Audience) -> (Vec<JointVector>, u32) {
         all.reports[0].push(report).unwrap();
         if cycle == begin {
             let motion = Box::new(Motion::Spline(throw));
-            let command = ControlCommand::Run { id: 1, motion };
-            let message = CommandMsg {
-                command,
-                link: None,
-            };
-            all.bridge.commands.push(message).unwrap();
+            order(ControlCommand::Run { id: 1, motion }, None);
         }
         real.cycle(now_ns.get(), 0, now_ns.get());
         if audience == Audience::Restless && cycle >= begin {
