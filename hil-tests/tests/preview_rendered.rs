@@ -211,9 +211,8 @@ fn with_rolling_rows_it_is_followed_and_a_camera_that_restarts_ends_that() {
     find(&mut stage);
     assert_follows(&mut stage, 60);
     let stamp_ns = 1_000_000_000 + (stage.frames as f64 / RATE_HZ * 1e9) as u64;
-    let (mut frame, size) = (vec![90; stage.renderer.frame_bytes()], [1344, 376]);
-    frame.fill(128);
-    let again = StereoFrame::from_yuyv(&frame, size, stamp_ns, 0).unwrap();
+    let grey = vec![128; stage.renderer.frame_bytes()];
+    let again = StereoFrame::from_yuyv(&grey, [1344, 376], stamp_ns, 0).unwrap();
     let reported = stage.preview.see(again.left());
     assert_eq!(
         (reported.state(), reported.restarts),
