@@ -32,25 +32,12 @@ pub struct Renderer {
     sensor: Sensor,
     rows: RowTimes,
     target_m: Option<Vector3<f64>>,
-    size_px: (usize, usize),
     shadows: Shadows,
-    life: Life,
-    drawn_px: usize,
-}
-
-/// What changes in a room by itself.
-#[derive(Debug, Default)]
-struct Life {
+    /// What moves in a drawn room by itself.
     bystanders: Bystanders,
-    /// What the camera adds, and how many frames it takes a second.
+    /// What the camera adds to a drawn room, and how many frames it takes a second.
     picture: Option<(Picture, f64)>,
-}
-
-impl Life {
-    /// Start of a frame (s).
-    fn time_s(&self, sequence: u64) -> f64 {
-        self.picture.map_or(0.0, |(_, hz)| sequence as f64 / hz)
-    }
+    drawn_px: usize,
 }
 
 impl Renderer {
@@ -67,16 +54,8 @@ impl Renderer {
     ) -> Self {
         let look = RopeLook::plain(rope, &appearance);
         let view = |image: &ImageView| View::plain(image, &appearance, cell);
-        let lamps = Vec::new();
-        Self::of(
-            camera,
-            cell,
-            look,
-            appearance,
-            (noise_levels, seed),
-            lamps,
-            view,
-        )
+        let noise = (noise_levels, seed);
+        Self::of(camera, cell, look, appearance, noise, Vec::new(), view)
     }
 
     /// Prepares both eyes in a drawn room, which has a surface for the rope and noise of
@@ -102,12 +81,9 @@ impl Renderer {
         let views = lamps.clone();
         let view = |image: &ImageView| View::of(image, room, &views);
         let noise = (room.picture.noise_levels, seed);
-        let life = Life {
+        Self {
             bystanders: room.bystanders.clone(),
             picture: Some((room.picture, frame_rate_hz)),
-        };
-        Self {
-            life,
             ..Self::of(camera, cell, look, appearance, noise, lamps, view)
         }
     }
@@ -124,18 +100,18 @@ impl Renderer {
     ) -> Self {
         let images = [ImageView::left(camera), ImageView::right(camera)]
             .map(|image| ImageCanvas::new(image, view(&image)));
-        let size_px = images[0].image.size_px();
+        let row_bytes = images[0].image.size_px().0 * 4;
         Self {
             images,
             cell: *cell,
             rope,
             appearance,
-            sensor: Sensor::new(noise_levels, size_px.0 * 4, seed),
+            sensor: Sensor::new(noise_levels, row_bytes, seed),
             rows: RowTimes::of(camera),
             target_m: None,
-            size_px,
             shadows: Shadows::of(lamps),
-            life: Life::default(),
+            bystanders: Bystanders::default(),
+            picture: None,
             drawn_px: 0,
         }
     }
@@ -143,7 +119,8 @@ impl Renderer {
     /// Bytes of one frame: both eyes side by side, two bytes a pixel.
     #[must_use]
     pub fn frame_bytes(&self) -> usize {
-        self.size_px.0 * self.size_px.1 * 4
+        let (width, height) = self.images[0].image.size_px();
+        width * height * 4
     }
 
     /// Pixels of the last frame that were not copied from the room as it stands: what a
@@ -179,16 +156,13 @@ impl Renderer {
     ///
     /// `out` must hold [`Renderer::frame_bytes`] bytes; only that many are drawn.
     pub fn render(&mut self, poses: &[ScenePose], sequence: u64, out: &mut [u8]) {
-        let (width, height) = self.size_px;
+        let (width, height) = self.images[0].image.size_px();
         let row_bytes = width * 4;
-        let begins_s = self.life.time_s(sequence);
-        let mut others = self.life.bystanders.at(begins_s);
-        let target = self.target_m;
-        others.extend(
-            target
-                .into_iter()
-                .flat_map(|at| target_solids(&self.cell, &at, &self.appearance)),
-        );
+        let begins_s = self.picture.map_or(0.0, |(_, hz)| sequence as f64 / hz);
+        let mut others = self.bystanders.at(begins_s);
+        if let Some(at) = &self.target_m {
+            others.extend(target_solids(&self.cell, at, &self.appearance));
+        }
         let cast = Cast {
             cell: &self.cell,
             rope: &self.rope,
@@ -219,7 +193,7 @@ impl Renderer {
                 }
             }
         }
-        if let Some((picture, _)) = self.life.picture {
+        if let Some((picture, _)) = self.picture {
             let row_s = |v: usize| begins_s + self.rows.opens_s(v);
             for (v, row) in out.chunks_exact_mut(row_bytes).take(height).enumerate() {
                 brighten(row, picture.gain(row_s(v)) as f32);
