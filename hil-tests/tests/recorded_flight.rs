@@ -4,8 +4,7 @@
 mod flight;
 
 use flight::fly;
-use rt_controller::recording::Item;
-use rt_controller::recording::{LogReader, Read, replay};
+use rt_controller::recording::{Item, LogReader, Read, replay};
 use std::collections::BTreeSet;
 
 #[test]

@@ -44,14 +44,9 @@ impl Network {
         self.now = self.now.max(now);
     }
 
-    /// When what arrives now was sent.
-    fn sent_at(&self) -> MonotonicNs {
-        self.now.plus_s(-self.delay_s)
-    }
-
     /// The next frame that has reached the controller.
     pub(super) fn take_frame(&mut self, client: u32) -> Option<Vec<u8>> {
-        let sent = self.sent_at();
+        let sent = self.now.plus_s(-self.delay_s);
         self.arm.take_frame(client, sent)
     }
 }

@@ -68,12 +68,6 @@ fn script(span_s: f64) -> FaultScript {
     text.parse().unwrap()
 }
 
-fn config(span_s: f64) -> VirtualRigConfig {
-    let mut config = VirtualRigConfig::new(Thresholds::strict().into(), script(span_s));
-    config.arm.seed = 20;
-    config
-}
-
 /// A swing from home, or the way home from where a stop left the arm.
 fn from_here(q: JointVector) -> Motion {
     let off = q.zip_with(START_POSE, |a, b| a - b).max_abs();
@@ -86,7 +80,8 @@ fn from_here(q: JointVector) -> Motion {
 
 /// Flies for `span_s`: who is stopped is brought up again and goes on.
 pub(crate) fn fly(span_s: f64) -> Flight {
-    let config = config(span_s);
+    let mut config = VirtualRigConfig::new(Thresholds::strict().into(), script(span_s));
+    config.arm.seed = 20;
     let before = ControlState::new(config.limits.clone(), config.settings);
     let mut rig = VirtualRig::new(config);
     let end = rig.now().plus_s(span_s);
