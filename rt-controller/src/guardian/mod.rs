@@ -50,6 +50,9 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
     config.check()?;
     let _sweep = DomainSweep::new(&config.domain);
     let bus = Bus::join(&config.domain)?;
+    // Its thread would inherit the real-time priority of this one.
+    let progress = Progress::default();
+    progress.report()?;
     set_up_thread(config)?;
     let mut runner = Runner {
         watchdog: Guardian::new(config.guardian_silence_ns()?),
@@ -57,8 +60,6 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
         watched: None,
         looked_ns: 0,
     };
-    let progress = Progress::default();
-    progress.report()?;
     let mut clock = MonotonicClock;
     let mut next_ns = clock.now_ns();
     let mut leaving_ns = None;
@@ -87,7 +88,7 @@ pub fn run(config: &ControllerConfig, stop: &AtomicBool) -> Result<(), Controlle
     }
 }
 
-/// Real-time priority for the calling thread, which is the only one.
+/// Real-time priority for the calling thread, which does all the work.
 fn set_up_thread(config: &ControllerConfig) -> Result<(), ControllerError> {
     let settings = RealTimeSettings {
         priority: config.guardian.priority,

@@ -63,7 +63,7 @@ pub fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
 /// here.
 pub fn limits(arm: &ArmArgs, address: Option<&ArmAddress>) -> Outcome<Limits> {
     match address.and_then(|address| address.service.as_ref()) {
-        Some(service) => Ok(service.limits.clone()),
+        Some(service) => service.config.resolve_limits().or_failed(),
         None => config::here::<Limits>(arm.limits.as_deref()).or_input(),
     }
 }

@@ -1,7 +1,6 @@
 //! A controller that runs as a service: what it is configured for, asked before anything moves.
 
 use anyhow::{Context, anyhow, bail, ensure};
-use arm_model::Limits;
 use rt_controller::ControllerConfig;
 use shared_types::FaultCode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
@@ -15,8 +14,8 @@ const ANSWERED_WITHIN: Duration = Duration::from_secs(20);
 /// A running controller.
 #[derive(Debug, Clone)]
 pub struct Service {
+    /// How it is configured; its limits are in it.
     pub config: ControllerConfig,
-    pub limits: Limits,
     /// Why it has stopped, if it has.
     pub stopped: Option<FaultCode>,
 }
@@ -47,12 +46,7 @@ impl Service {
             },
             other => bail!("the controller of `{domain}` answered with {other:?}"),
         };
-        let limits = config.resolve_limits()?;
-        Ok(Self {
-            config,
-            limits,
-            stopped,
-        })
+        Ok(Self { config, stopped })
     }
 
     /// Refuses a controller that was started anew with another configuration since it was found.
