@@ -45,9 +45,10 @@ impl Flight {
         let moving = |c: &&RecordedCycle| c.record.mode == ControllerMode::Moving as u8;
         let moved: Vec<_> = self.cycles.iter().filter(moving).collect();
         let end_m = |c: &RecordedCycle| pole.attach_pose(&c.record.q_c).0;
+        // A setpoint that a busy machine sends late is for the instant at which it goes out.
+        let at_ns = |c: &RecordedCycle| c.record.deadline_ns + u64::from(c.input.late_ns);
         let speeds_m_s = moved.windows(2).map(|pair| {
-            // A busy machine misses cycles: what counts is the time that passed.
-            let passed_ns = pair[1].record.deadline_ns - pair[0].record.deadline_ns;
+            let passed_ns = at_ns(pair[1]) - at_ns(pair[0]);
             (end_m(pair[1]) - end_m(pair[0])).norm() / (1e-9 * passed_ns as f64)
         });
         speeds_m_s.fold(0.0, f64::max)
