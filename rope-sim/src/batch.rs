@@ -2,13 +2,13 @@
 
 use crate::base_path::{BasePath, Interval, NotFinite};
 use crate::contact::check_start;
-use crate::equilibrium::hanging_links;
+use crate::equilibrium::{StartState, hanging_links, swaying_links};
 use crate::error::SimulateError;
 use crate::group::{GroupTask, Member};
 use crate::knot::attitude;
 use crate::lanes::Kernel;
 use crate::motion::AttachMotion;
-use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, check};
+use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, Sway, check};
 use crate::scene::{ContactSummary, DominoOutcome, Scene};
 use crate::watch::Watched;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -218,17 +218,21 @@ impl Batch<'_> {
             let path = path
                 .as_ref()
                 .map_err(|bad| SimulateError::motion_not_finite(*index, bad.time_s))?;
-            let links = start_attitudes(candidate, path, self.options.start);
-            check_start(self.scene, candidate.rope, &path.start.p_m, &links)
-                .map_err(|reason| SimulateError::of(*index, reason))?;
+            let start = start_state(candidate, path, self.options.start);
+            check_start(
+                self.scene,
+                candidate.rope,
+                &path.start.p_m,
+                &start.attitudes,
+            )
+            .map_err(|reason| SimulateError::of(*index, reason))?;
             members.push(Member {
                 rope: candidate.rope,
                 path,
-                extras: candidate.extras,
-                links,
+                start,
             });
         }
-        let is_alone = self.scene.is_empty() && members.iter().all(|m| m.extras.is_none());
+        let is_alone = self.scene.is_empty() && members.iter().all(|m| m.rope.extras.is_none());
         let results = if is_alone {
             self.kernel.run(self.task::<true>(&members))
         } else {
@@ -258,14 +262,17 @@ fn address(motion: &dyn AttachMotion) -> Option<usize> {
     (size_of_val(motion) > 0).then(|| core::ptr::from_ref(motion).cast::<()>().addr())
 }
 
-fn start_attitudes(candidate: &Candidate, path: &BasePath, start: Start) -> Vec<[f64; 4]> {
+fn start_state(candidate: &Candidate, path: &BasePath, start: Start) -> StartState {
     let rope = candidate.rope;
     match start {
         Start::Straight { joint0_rotvec } => {
             let turn = UnitQuaternion::from_scaled_axis(Vector3::from(joint0_rotvec));
             let q = attitude(&path.start) * turn;
-            vec![[q.w, q.i, q.j, q.k]; rope.links as usize]
+            StartState::at_rest(vec![[q.w, q.i, q.j, q.k]; rope.links as usize])
         }
-        Start::Equilibrium => hanging_links(rope, &candidate.extras, &path.start.r),
+        Start::Equilibrium if candidate.sway == Sway::NONE => {
+            StartState::at_rest(hanging_links(rope, &path.start.r))
+        }
+        Start::Equilibrium => swaying_links(rope, &path.start.r, &candidate.sway),
     }
 }

@@ -6,14 +6,13 @@
 
 use crate::clock::BaseState;
 use crate::extra_loads::MassLanes;
-use crate::extras::RopeExtras;
 use crate::kernel::{Elimination, GRAVITY_M_S2, step};
 use crate::load::LinkLoads;
 use crate::scheme::{Phase, Scheme};
 use crate::state::{Link, RopeLanes};
 use arm_model::kinematics::FrameMotion;
 use nalgebra::{DVector, Quaternion, UnitQuaternion, Vector3};
-use shared_types::RopeParams;
+use shared_types::{RopeExtras, RopeParams};
 
 /// Numbers per link in a state: attitude, scalar first, and angular velocity (world frame,
 /// rad/s); or their rates.
@@ -123,7 +122,7 @@ fn drift(mass_slope: f64) -> f64 {
         ..RopeExtras::NONE
     };
     let mut masses = MassLanes::uniform(22);
-    masses.set(0, &params, &extras);
+    masses.set(0, &params.with_extras(extras));
     let model = Model { rope, masses };
     // Bent and twisted along its length, and turning about all three axes.
     let links = (0..22).flat_map(|i| {

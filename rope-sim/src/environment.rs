@@ -1,25 +1,19 @@
-//! What a group of ropes meets besides gravity: obstacles, air, its own rest shape and
-//! mass distribution.
+//! What a group of ropes meets besides gravity: obstacles, and what the ropes have beyond
+//! their nine parameters.
 
 use crate::clock::{BaseState, Clock};
 use crate::contact::{Contacts, LOOK_PERIOD, Node, Predicted, StepEnd, corrected, predicted};
-use crate::extra_loads::{DragLanes, MassLanes};
-use crate::extras::RopeExtras;
+use crate::extra_loads::ExtraLanes;
 use crate::kernel::{Elimination, StepReport, step};
 use crate::lanes::Lanes;
 use crate::load::{LinkLoads, Unloaded};
-use crate::scheme::Scheme;
 use crate::state::{Link, RopeLanes};
-use nalgebra::{UnitQuaternion, Vector3};
 use shared_types::RopeParams;
 
-/// Obstacles, air, rest shape and mass distribution of a group, with the loads of the
-/// current step.
+/// Obstacles and extras of a group, with the loads of the current step.
 pub(crate) struct Environment<V> {
     pub(crate) contacts: Contacts<V>,
-    drag: Option<DragLanes<V>>,
-    masses: Option<MassLanes<V>>,
-    is_curved: bool,
+    extras: ExtraLanes<V>,
     nodes: Vec<Node<V>>,
     loads: LinkLoads<V>,
     steps: usize,
@@ -29,33 +23,14 @@ pub(crate) struct Environment<V> {
 }
 
 impl<V: Lanes> Environment<V> {
-    /// Air, rest shape and mass distribution of `ropes`, one per lane, among `contacts`.
+    /// Extras of `ropes`, one per lane, among `contacts`.
     #[inline(always)]
-    pub(crate) fn new(contacts: Contacts<V>, ropes: &[(&RopeParams, RopeExtras)]) -> Self {
-        let links = ropes.first().map_or(0, |(r, _)| r.links as usize);
-        let mut drag = DragLanes::none();
-        let mut masses = MassLanes::uniform(links);
+    pub(crate) fn new(contacts: Contacts<V>, ropes: &[&RopeParams]) -> Self {
+        let links = ropes.first().map_or(0, |rope| rope.links as usize);
         let mut loads = LinkLoads::new(links);
-        for lane in 0..V::COUNT {
-            let Some((rope, extras)) = ropes.get(lane).or_else(|| ropes.last()) else {
-                continue;
-            };
-            drag.set(lane, rope, extras);
-            masses.set(lane, rope, extras);
-            let curvature = Vector3::from(extras.rest_curvature_per_m);
-            let q = UnitQuaternion::from_scaled_axis(curvature * rope.link_length_m());
-            loads.rest_turn.set(lane, [q.w, q.i, q.j, q.k]);
-        }
-        let any_drag = ropes.iter().any(|(_, e)| e.air_drag.is_some());
-        let any_slope = ropes.iter().any(|(_, e)| e.mass_slope.abs() > 0.0);
-        let bends = |c: &f64| c.abs() > 0.0;
         Self {
             contacts,
-            drag: any_drag.then_some(drag),
-            masses: any_slope.then_some(masses),
-            is_curved: ropes
-                .iter()
-                .any(|(_, e)| e.rest_curvature_per_m.iter().any(bends)),
+            extras: ExtraLanes::new(ropes, &mut loads),
             nodes: vec![Node::zero(); links],
             loads,
             steps: 0,
@@ -64,9 +39,16 @@ impl<V: Lanes> Environment<V> {
         }
     }
 
+    /// Looks around from where the rope starts.
+    #[inline(always)]
+    pub(crate) fn start(&mut self, links: &[Link<V>], rope: &RopeLanes<V>, attach: &BaseState<V>) {
+        self.extras.start(links, &attach.dynamics);
+        self.look(links, rope, attach);
+    }
+
     /// Looks around from where the rope is.
     #[inline(always)]
-    pub(crate) fn look(&mut self, links: &[Link<V>], rope: &RopeLanes<V>, attach: &BaseState<V>) {
+    fn look(&mut self, links: &[Link<V>], rope: &RopeLanes<V>, attach: &BaseState<V>) {
         corrected(&mut self.nodes, links, rope, attach);
         self.contacts.look(&self.nodes, rope);
     }
@@ -85,15 +67,15 @@ impl<V: Lanes> Environment<V> {
         let scheme = &clock.scheme;
         let in_contact = self.contacts.is_engaged();
         self.steps += 1;
-        let loaded = self.drag.is_some() || self.masses.is_some();
-        let report = if in_contact || self.is_curved || loaded {
+        let report = if in_contact || self.extras.is_any() {
             for link in links.iter_mut() {
                 link.predict(scheme);
             }
             predicted(&mut self.nodes, links, rope, attach, scheme);
             self.loads.clear();
-            self.add_drag(links, rope, scheme);
-            self.add_masses(links, scheme);
+            let base = &attach.dynamics;
+            self.extras
+                .load(&mut self.loads, links, &self.nodes, rope, base, scheme);
             if in_contact {
                 let predicted = Predicted {
                     links,
@@ -103,7 +85,8 @@ impl<V: Lanes> Environment<V> {
                 };
                 self.contacts.load(&mut self.loads, predicted);
             }
-            let report = step(links, scratch, rope, &attach.dynamics, scheme, &self.loads);
+            let report = step(links, scratch, rope, base, scheme, &self.loads);
+            self.extras.settle(links, base, scheme);
             if in_contact {
                 corrected(&mut self.nodes, links, rope, attach);
                 self.read_clock(clock);
@@ -118,28 +101,6 @@ impl<V: Lanes> Environment<V> {
         }
         self.restart_lanes(clock);
         report
-    }
-
-    #[inline(always)]
-    fn add_drag(&mut self, links: &[Link<V>], rope: &RopeLanes<V>, scheme: &Scheme<V>) {
-        let Some(drag) = &self.drag else { return };
-        let per_length = rope.link_length.recip();
-        for (index, (link, node)) in links.iter().zip(&self.nodes).enumerate() {
-            let load = drag.on_link(link, node, per_length, scheme);
-            self.loads.add(index, &load);
-        }
-        if let Some(node) = self.nodes.last() {
-            self.loads.add(links.len() - 1, &drag.on_lead(node, scheme));
-        }
-    }
-
-    #[inline(always)]
-    fn add_masses(&mut self, links: &[Link<V>], scheme: &Scheme<V>) {
-        let Some(masses) = &self.masses else { return };
-        for (index, (link, node)) in links.iter().zip(&self.nodes).enumerate() {
-            let load = masses.on_link(index, link, node.span, scheme);
-            self.loads.add(index, &load);
-        }
     }
 
     #[inline(always)]

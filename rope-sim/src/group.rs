@@ -1,11 +1,11 @@
 //! One group of ropes with equal link counts, advanced from start to horizon.
 
-use crate::algebra::{Quat, Vec3};
+use crate::algebra::Vec3;
 use crate::base_path::BasePath;
 use crate::clock::Clock;
 use crate::contact::Contacts;
 use crate::environment::Environment;
-use crate::extras::RopeExtras;
+use crate::equilibrium::StartState;
 use crate::frames::{FrameRecorder, FrameTimes, NodeTrack};
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes};
@@ -28,9 +28,7 @@ const MAX_SPIN_RAD_S: f64 = 2e4;
 pub(crate) struct Member<'a> {
     pub(crate) rope: &'a RopeParams,
     pub(crate) path: &'a BasePath,
-    pub(crate) extras: RopeExtras,
-    /// Attitudes of the links at the start, scalar first.
-    pub(crate) links: Vec<[f64; 4]>,
+    pub(crate) start: StartState,
 }
 
 /// The work of one group; at most as many members as the kernel has lanes, all with
@@ -57,7 +55,7 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
         let Some(first) = self.members.first() else {
             return Vec::new();
         };
-        let n = first.links.len();
+        let n = first.start.attitudes.len();
         let mut rope = rope_lanes::<V>(self.members);
         let mut links = start_links::<V>(self.members);
         let mut scratch = vec![Elimination::empty(); n];
@@ -66,10 +64,10 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
         let mut clock = Clock::new(&paths, &ropes, self.watch.origin_m());
         let mut recorder = FrameRecorder::new(self.frames, &clock, n, self.single_precision);
         let start = clock.base();
-        let hanging = start.position.add(hanging_tip(&links, rope.link_length));
+        let [hanging, swinging] = tip_from_clamp(&links, rope.link_length);
         let mut watcher = Watcher::new(
             &self.watch,
-            [hanging, start.velocity],
+            [start.position.add(hanging), start.velocity.add(swinging)],
             count,
             self.horizon_s,
         );
@@ -79,11 +77,10 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
         let mut environment = (!ALONE).then(|| {
             let origin_m = self.watch.origin_m();
             let contacts = Contacts::new(self.scene, &ropes, self.max_step_s, origin_m);
-            let extras: Vec<_> = self.members.iter().map(|m| (m.rope, m.extras)).collect();
-            Environment::new(contacts, &extras)
+            Environment::new(contacts, &ropes)
         });
         if let Some(environment) = &mut environment {
-            environment.look(&links, &rope, &start);
+            environment.start(&links, &rope, &start);
         }
 
         while clock.next_step(&mut rope, &mut restarts) {
@@ -221,25 +218,29 @@ fn rope_lanes<V: Lanes>(members: &[Member]) -> RopeLanes<V> {
 
 #[inline(always)]
 fn start_links<V: Lanes>(members: &[Member]) -> Vec<Link<V>> {
-    let mut links = vec![Link::at_rest(); members[0].links.len()];
+    let mut links = vec![Link::at_rest(); members[0].start.attitudes.len()];
     for lane in 0..V::COUNT {
-        let member = &members[lane.min(members.len() - 1)];
-        for (link, q) in links.iter_mut().zip(&member.links) {
+        let start = &members[lane.min(members.len() - 1)].start;
+        for (link, q) in links.iter_mut().zip(&start.attitudes) {
             link.q.set(lane, *q);
+        }
+        for (link, w) in links.iter_mut().zip(&start.rates_rad_s) {
+            link.w.set(lane, *w);
         }
     }
     links
 }
 
-/// Lead relative to node 0.
+/// Place and velocity of the lead relative to node 0.
 #[inline(always)]
-fn hanging_tip<V: Lanes>(links: &[Link<V>], link_length: V) -> Vec3<V> {
-    let mut tip = Vec3::zero();
+fn tip_from_clamp<V: Lanes>(links: &[Link<V>], link_length: V) -> [Vec3<V>; 2] {
+    let (mut tip, mut velocity) = (Vec3::zero(), Vec3::zero());
     for link in links {
-        let q: Quat<V> = link.q;
-        tip = tip.add(q.down(link_length));
+        let span = link.q.down(link_length);
+        tip = tip.add(span);
+        velocity = link.w.cross_add(span, velocity);
     }
-    tip
+    [tip, velocity]
 }
 
 #[cfg(test)]
@@ -256,8 +257,7 @@ mod tests {
         let members = ropes.iter().map(|rope| Member {
             rope,
             path,
-            extras: RopeExtras::NONE,
-            links: vec![[1.0, 0.0, 0.0, 0.0]; rope.links as usize],
+            start: StartState::at_rest(vec![[1.0, 0.0, 0.0, 0.0]; rope.links as usize]),
         });
         kernel.run(GroupTask::<true> {
             scene: &Scene::EMPTY,

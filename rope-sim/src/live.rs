@@ -2,12 +2,13 @@
 
 use crate::algebra::Vec3;
 use crate::clock::BaseState;
+use crate::contact::{Node, predicted};
 use crate::equilibrium::hanging_links;
 use crate::error::{SimulateError, refuse_unless_positive};
-use crate::extras::RopeExtras;
+use crate::extra_loads::ExtraLanes;
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes, run_scalar};
-use crate::load::Unloaded;
+use crate::load::{LinkLoads, Unloaded};
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{Link, RopeLanes};
 use arm_model::kinematics::FrameMotion;
@@ -29,6 +30,29 @@ pub struct LiveRope {
     step_s: f64,
     time_s: f64,
     nodes: Vec<Vector3<f64>>,
+    /// What the rope has beyond its nine parameters.
+    extras: Option<Extras>,
+}
+
+/// Extras with the loads of the current step.
+#[derive(Clone)]
+struct Extras {
+    lanes: ExtraLanes<f64>,
+    loads: LinkLoads<f64>,
+    nodes: Vec<Node<f64>>,
+}
+
+impl Extras {
+    fn of(rope: &RopeParams, links: &[Link<f64>], attach: &FrameMotion) -> Self {
+        let mut loads = LinkLoads::new(links.len());
+        let mut lanes = ExtraLanes::new(&[rope], &mut loads);
+        lanes.start(links, &BaseState::of(attach).dynamics);
+        Self {
+            lanes,
+            loads,
+            nodes: vec![Node::zero(); links.len()],
+        }
+    }
 }
 
 impl core::fmt::Debug for LiveRope {
@@ -58,12 +82,16 @@ impl LiveRope {
             return Err(SimulateError::motion_not_finite(0, 0.0));
         }
         let mut links: Vec<Link<f64>> = Vec::new();
-        for q in hanging_links(rope, &RopeExtras::NONE, &attach.r) {
+        for q in hanging_links(rope, &attach.r) {
             let mut link = Link::at_rest();
             link.q.set(0, q);
             links.push(link);
         }
         let n = links.len();
+        let extras = rope
+            .extras
+            .is_some()
+            .then(|| Extras::of(rope, &links, attach));
         let mut live = Self {
             rope: RopeLanes::of(rope),
             params: *rope,
@@ -75,6 +103,7 @@ impl LiveRope {
             step_s: 0.0,
             time_s: 0.0,
             nodes: vec![Vector3::zeros(); n + 1],
+            extras,
         };
         live.place_nodes(&attach.p_m);
         Ok(live)
@@ -125,6 +154,29 @@ impl LiveRope {
         }
     }
 
+    #[inline(always)]
+    fn step(&mut self, attach: &BaseState<f64>) {
+        let (links, scratch, rope) = (&mut self.links, &mut self.scratch, &self.rope);
+        let (base, scheme) = (&attach.dynamics, &self.scheme);
+        let Some(Extras {
+            lanes,
+            loads,
+            nodes,
+        }) = &mut self.extras
+        else {
+            step(links, scratch, rope, base, scheme, &Unloaded);
+            return;
+        };
+        for link in links.iter_mut() {
+            link.predict(scheme);
+        }
+        predicted(nodes, links, rope, attach, scheme);
+        loads.clear();
+        lanes.load(loads, links, nodes, rope, base, scheme);
+        step(links, scratch, rope, base, scheme, loads);
+        lanes.settle(links, base, scheme);
+    }
+
     fn set_step(&mut self, step_s: f64) {
         let phase = match self.phase {
             None => Phase::Restart,
@@ -164,14 +216,7 @@ impl LaneTask for Advance<'_> {
             done += 1.0;
             live.set_step(step_s);
             let time_s = from_s + span_s * (done / steps);
-            step(
-                &mut live.links,
-                &mut live.scratch,
-                &live.rope,
-                &BaseState::of(&(self.motion)(time_s)).dynamics,
-                &live.scheme,
-                &Unloaded,
-            );
+            live.step(&BaseState::of(&(self.motion)(time_s)));
         }
     }
 }
@@ -182,6 +227,7 @@ mod tests {
     use crate::{Candidate, FrameTimes, Precision, SimOptions, roll_out};
     use core::f64::consts::TAU;
     use nalgebra::Rotation3;
+    use shared_types::{BendingFriction, RopeExtras};
 
     fn rope() -> RopeParams {
         RopeParams::from_array([22.0, 0.55, 0.02, 0.3, 0.008, 0.06, 0.06, 0.03, 0.8])
@@ -215,8 +261,20 @@ mod tests {
     /// sign jumps: a full turn must not matter to either.
     #[test]
     fn follows_the_batch_simulation() {
-        for motion in [swing, turn] {
-            let mut live = LiveRope::new(&rope(), &motion(0.0), 5e-4).unwrap();
+        let friction = BendingFriction {
+            moment_max_nm: 0.004,
+            slip_curvature_per_m: 0.6,
+        };
+        let extras = RopeExtras {
+            rest_curvature_per_m: [0.3, -0.5, 0.0],
+            mass_slope: 0.2,
+            friction: Some(friction),
+            ..RopeExtras::NONE
+        };
+        let ropes = [rope(), rope().with_extras(extras)];
+        let motions: [fn(f64) -> FrameMotion; 2] = [swing, turn];
+        for (rope, motion) in [(0, 0), (0, 1), (1, 1)].map(|(r, m)| (ropes[r], motions[m])) {
+            let mut live = LiveRope::new(&rope, &motion(0.0), 5e-4).unwrap();
             for cycle in 1..=250 {
                 live.advance(&motion, f64::from(cycle) * 0.004);
             }
@@ -228,7 +286,6 @@ mod tests {
                 },
                 ..SimOptions::new(5e-4, Precision::F64, 1.0)
             };
-            let rope = rope();
             let batch = roll_out(&[Candidate::new(&rope, &motion)], &options).unwrap();
             for (node, at) in live.nodes().iter().enumerate() {
                 let d = (batch[0].nodes.position(0, node) - at).norm();

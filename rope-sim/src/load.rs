@@ -86,6 +86,9 @@ pub(crate) trait Loads<V> {
     fn on_link(&self, link: usize) -> Option<&Load<V>>;
     /// Turn of a link against the one before in an unloaded rope.
     fn rest_turn(&self) -> Quat<V>;
+    /// Moment by which a link's nearer joint resists its turning beyond spring and damper
+    /// (N m, world), if any does in any lane.
+    fn joint_moment(&self, link: usize) -> Option<Vec3<V>>;
 }
 
 /// Nothing acts; the compiler leaves no trace of it.
@@ -101,14 +104,21 @@ impl<V: Lanes> Loads<V> for Unloaded {
     fn rest_turn(&self) -> Quat<V> {
         Quat::identity()
     }
+    #[inline(always)]
+    fn joint_moment(&self, _link: usize) -> Option<Vec3<V>> {
+        None
+    }
 }
 
 /// The loads of one step as they come together, link by link.
+#[derive(Clone)]
 pub(crate) struct LinkLoads<V> {
     loads: Vec<Load<V>>,
     /// Whether a link has any.
     present: Vec<bool>,
     pub(crate) rest_turn: Quat<V>,
+    /// By joint; empty where no joint resists.
+    pub(crate) joint_moments: Vec<Vec3<V>>,
 }
 
 impl<V: Lanes> LinkLoads<V> {
@@ -119,6 +129,7 @@ impl<V: Lanes> LinkLoads<V> {
             loads: vec![Load::none(); links],
             present: vec![false; links],
             rest_turn: Quat::identity(),
+            joint_moments: Vec::new(),
         }
     }
 
@@ -148,5 +159,9 @@ impl<V: Lanes> Loads<V> for LinkLoads<V> {
     #[inline(always)]
     fn rest_turn(&self) -> Quat<V> {
         self.rest_turn
+    }
+    #[inline(always)]
+    fn joint_moment(&self, link: usize) -> Option<Vec3<V>> {
+        self.joint_moments.get(link).copied()
     }
 }

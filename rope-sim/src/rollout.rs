@@ -1,7 +1,6 @@
 //! What is simulated, how, and what comes back.
 
 use crate::error::{SimulateError, refuse_unless, refuse_unless_finite, refuse_unless_positive};
-use crate::extras::RopeExtras;
 use crate::frames::{FrameTimes, NodeTrack};
 use crate::lanes::Precision;
 use crate::motion::AttachMotion;
@@ -67,25 +66,43 @@ pub struct Candidate<'a> {
     /// Motion of its attach frame. Candidates with the very same motion (the same
     /// reference) share its evaluation.
     pub motion: &'a dyn AttachMotion,
-    /// Physics beyond the nine parameters.
-    pub extras: RopeExtras,
+    /// How it swings at the start, which must be [`Start::Equilibrium`].
+    pub sway: Sway,
+}
+
+/// Swing left in a rope when a motion begins: its first mode in two planes, about. The rope
+/// hangs as it would if gravity were turned, and moves as if that turn were growing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sway {
+    /// Turn of gravity about the world's x and y axes (rad).
+    pub angle_rad: [f64; 2],
+    /// Its rate (rad/s).
+    pub rate_rad_s: [f64; 2],
+}
+
+impl Sway {
+    /// A rope at rest.
+    pub const NONE: Self = Self {
+        angle_rad: [0.0; 2],
+        rate_rad_s: [0.0; 2],
+    };
 }
 
 impl<'a> Candidate<'a> {
-    /// A plain rope on a motion.
+    /// A rope on a motion, at rest before it.
     #[must_use]
     pub fn new(rope: &'a RopeParams, motion: &'a dyn AttachMotion) -> Self {
         Self {
             rope,
             motion,
-            extras: RopeExtras::NONE,
+            sway: Sway::NONE,
         }
     }
 
-    /// The same with physics beyond the nine parameters.
+    /// The same, swinging at the start.
     #[must_use]
-    pub fn with_extras(self, extras: RopeExtras) -> Self {
-        Self { extras, ..self }
+    pub fn with_sway(self, sway: Sway) -> Self {
+        Self { sway, ..self }
     }
 }
 
@@ -136,8 +153,13 @@ pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<()
     for (index, candidate) in candidates.iter().enumerate() {
         let rope = candidate.rope.validate();
         rope.map_err(|e| SimulateError::of(index, e))?;
-        let extras = candidate.extras.check();
-        extras.map_err(|e| SimulateError::of(index, e))?;
+        let sway = candidate.sway;
+        let numbers = [sway.angle_rad, sway.rate_rad_s].concat();
+        refuse_unless_finite("sway", numbers).map_err(|e| SimulateError::of(index, e))?;
+        if sway != Sway::NONE && options.start != Start::Equilibrium {
+            let reason = "it swings at the start, but is to start straight; give it one start";
+            return Err(SimulateError::of(index, reason));
+        }
         let ends_s = candidate.motion.duration_s();
         if !candidate.motion.holds_after_end() && ends_s < horizon_s - 1e-9 {
             return Err(SimulateError::of(

@@ -103,7 +103,8 @@ impl<V: Lanes> Scheme<V> {
 pub(crate) fn joint_resistance(h_s: f64, phase: Phase, rope: &RopeParams) -> f64 {
     let s = Factors::of(phase);
     s.correct_w(h_s) * rope.joint_damping_nms_per_rad
-        + s.correct_phi(h_s) * rope.joint_stiffness_nm_per_rad
+        + s.correct_phi(h_s)
+            * (rope.joint_stiffness_nm_per_rad + rope.friction_stiffness_nm_per_rad())
 }
 
 /// The scheme's four numbers.

@@ -68,6 +68,7 @@ fn friction_holds_up_to_its_angle_and_no_further() {
         lead_mass_kg: 0.1,
         lead_radius_m: 0.002,
         link_extra_scale: 0.05,
+        extras: None,
     };
     let friction: f64 = 0.5;
     for precision in [Precision::F64, Precision::F32] {

@@ -10,10 +10,10 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rope_sim::{
-    Candidate, Domino, Kernel, Obstacle, Outcome, Precision, Rollout, RopeExtras, Scene,
-    SimOptions, roll_out_in_with,
+    Candidate, Domino, Kernel, Obstacle, Outcome, Precision, Rollout, Scene, SimOptions,
+    roll_out_in_with,
 };
-use shared_types::RopeParams;
+use shared_types::{BendingFriction, RopeExtras, RopeParams};
 use support::contact::{random_rope, random_whip, wall};
 use support::pushed::Pushed;
 use support::{AIR, options};
@@ -39,6 +39,10 @@ fn extras(index: usize) -> RopeExtras {
         air_drag: (index % 3 == 1).then_some(AIR),
         rest_curvature_per_m: [0.0, if index % 4 == 2 { 1.5 } else { 0.0 }, 0.0],
         mass_slope: if index % 5 == 3 { 0.4 } else { 0.0 },
+        friction: (index % 6 == 4).then_some(BendingFriction {
+            moment_max_nm: 0.002,
+            slip_curvature_per_m: 0.5,
+        }),
     }
 }
 
@@ -47,15 +51,16 @@ fn throws(seed: u64) -> Vec<(RopeParams, Pushed)> {
     (0..20)
         .map(|i| {
             let links = if i % 5 == 4 { 21.0 } else { 20.0 };
-            (random_rope(&mut rng, links), random_whip(&mut rng))
+            let rope = random_rope(&mut rng, links).with_extras(extras(i));
+            (rope, random_whip(&mut rng))
         })
         .collect()
 }
 
 fn candidates(throws: &[(RopeParams, Pushed)]) -> Vec<Candidate<'_>> {
-    let numbered = throws.iter().enumerate();
-    numbered
-        .map(|(i, (rope, whip))| Candidate::new(rope, whip).with_extras(extras(i)))
+    throws
+        .iter()
+        .map(|(rope, whip)| Candidate::new(rope, whip))
         .collect()
 }
 

@@ -7,10 +7,9 @@ mod support;
 use arm_model::kinematics::FrameMotion;
 use nalgebra::{Rotation3, Vector3};
 use rope_sim::{
-    AirDrag, AttachMotion, Candidate, Domino, Outcome, Precision, Rollout, RopeExtras, Scene,
-    SimOptions, roll_out,
+    AttachMotion, Candidate, Domino, Outcome, Precision, Rollout, Scene, SimOptions, roll_out,
 };
-use shared_types::RopeParams;
+use shared_types::{AirDrag, RopeExtras, RopeParams};
 use support::{AIR, G_M_S2, options, released, simulate, still, world};
 
 /// One rigid link with a lead: a pendulum.
@@ -25,6 +24,7 @@ fn pendulum() -> RopeParams {
         lead_mass_kg: 0.1,
         lead_radius_m: 0.01,
         link_extra_scale: 0.05,
+        extras: None,
     }
 }
 
@@ -48,8 +48,10 @@ fn run(
     motion: &dyn AttachMotion,
     options: &SimOptions,
 ) -> Rollout {
-    let candidate = Candidate::new(rope, motion).with_extras(extras);
-    roll_out(&[candidate], options).unwrap().remove(0)
+    let rope = rope.with_extras(extras);
+    roll_out(&[Candidate::new(&rope, motion)], options)
+        .unwrap()
+        .remove(0)
 }
 
 /// Towed at a constant speed a pendulum trails at the angle where drag and weight

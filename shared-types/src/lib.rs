@@ -30,6 +30,8 @@ pub mod operating_mode;
 pub mod plan;
 #[cfg(feature = "std")]
 pub mod rope;
+#[cfg(feature = "std")]
+pub mod rope_extras;
 pub mod time;
 
 #[cfg(feature = "std")]
@@ -43,6 +45,8 @@ pub use operating_mode::{Arming, OperatingMode};
 pub use plan::{Condition, ErrorForecast, LimitedBy, Plan, Task, Verdict};
 #[cfg(feature = "std")]
 pub use rope::{RopeEstimate, RopeParams};
+#[cfg(feature = "std")]
+pub use rope_extras::{AirDrag, BendingFriction, RopeExtras};
 pub use time::MonotonicNs;
 
 /// Version of this build, written into every result file.

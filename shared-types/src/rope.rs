@@ -1,12 +1,14 @@
 //! The nine rope parameters (the paper's ξ) with their ranges.
 
+use crate::rope_extras::RopeExtras;
 use arm_model::unit_hint;
 use serde::{Deserialize, Serialize};
 
 /// Number of rope parameters.
 pub const ROPE_PARAMETERS: usize = 9;
 
-/// Rope parameters, the paper's ξ. TOML form: `rope.toml`, keys as the fields.
+/// Rope parameters, the paper's ξ, and what a rope has beyond them. TOML form: `rope.toml`,
+/// keys as the fields.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RopeParams {
@@ -28,6 +30,9 @@ pub struct RopeParams {
     pub lead_radius_m: f64,
     /// Scale e of the link's inertia radius, `R_I = max(e s/2, r)` (1).
     pub link_extra_scale: f64,
+    /// Physics beyond these nine; `None` for none.
+    #[serde(default)]
+    pub extras: Option<RopeExtras>,
 }
 
 /// Key, smallest and largest value of one parameter over which networks are
@@ -103,6 +108,24 @@ pub struct RopeError {
     max: f64,
 }
 
+impl RopeError {
+    /// Refuses a value that is not from `min` to `max`.
+    pub(crate) fn unless_within(
+        key: &'static str,
+        value: f64,
+        min: f64,
+        max: f64,
+    ) -> Result<(), Self> {
+        let refusal = Self {
+            key,
+            value,
+            min,
+            max,
+        };
+        (value >= min && value <= max).then_some(()).ok_or(refusal)
+    }
+}
+
 /// Most links a rope may have anywhere in the system.
 const MAX_LINKS: u32 = 200;
 
@@ -136,7 +159,7 @@ impl RopeParams {
         ]
     }
 
-    /// From nine values in the order of [`RANGES`]; links are rounded.
+    /// From nine values in the order of [`RANGES`], without extras; links are rounded.
     #[must_use]
     pub fn from_array(v: [f64; ROPE_PARAMETERS]) -> Self {
         Self {
@@ -149,22 +172,16 @@ impl RopeParams {
             lead_mass_kg: v[6],
             lead_radius_m: v[7],
             link_extra_scale: v[8],
+            extras: None,
         }
     }
 
     /// Refuses the first value that is not finite or not physical.
     pub fn validate(&self) -> Result<(), RopeError> {
         for ((value, (min, max)), range) in self.to_array().into_iter().zip(PHYSICAL).zip(RANGES) {
-            if !(value >= min && value <= max) {
-                return Err(RopeError {
-                    key: range.key,
-                    value,
-                    min,
-                    max,
-                });
-            }
+            RopeError::unless_within(range.key, value, min, max)?;
         }
-        Ok(())
+        self.beyond().validate()
     }
 
     /// Keys of parameters outside the trained ranges [`RANGES`].

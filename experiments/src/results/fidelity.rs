@@ -18,14 +18,13 @@ use planner::plan::{PlanOptions, PlanRequest};
 use planner::ropes::trial_rope;
 use planner::synthetic::{FilmTiming, Filmed, RopeFilm, project};
 use rope_sim::{
-    AirDrag, AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, RopeExtras, SimOptions,
-    SimulateError, roll_out,
+    AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, SimOptions, SimulateError, roll_out,
 };
 use run_log::files;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use shared_types::rope::RANGES;
-use shared_types::{RopeParams, Task};
+use shared_types::{AirDrag, RopeExtras, RopeParams, Task};
 use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 use toml::Table;
@@ -84,7 +83,6 @@ struct RealRope {
     /// Kind and lead.
     name: String,
     params: RopeParams,
-    extras: RopeExtras,
 }
 
 impl FidelityConfig {
@@ -99,14 +97,15 @@ impl FidelityConfig {
             ] {
                 parameters.insert(key.to_owned(), value.into());
             }
+            let extras = RopeExtras {
+                air_drag: Some(self.air),
+                rest_curvature_per_m: [0.0, kind.curvature_per_m, 0.0],
+                mass_slope: kind.mass_slope,
+                friction: None,
+            };
             Ok(RealRope {
                 name: format!("{}, {:.0} g", kind.name, 1e3 * lead_mass_kg),
-                params: parameters.try_into()?,
-                extras: RopeExtras {
-                    air_drag: Some(self.air),
-                    rest_curvature_per_m: [0.0, kind.curvature_per_m, 0.0],
-                    mass_slope: kind.mass_slope,
-                },
+                params: parameters.try_into::<RopeParams>()?.with_extras(extras),
             })
         };
         self.ropes
@@ -151,12 +150,10 @@ const TABLE: [Column<FidelityRow>; 7] = [
 /// Keypoint paths of a rope in a motion.
 fn paths(
     rope: &RopeParams,
-    extras: RopeExtras,
     motion: &dyn AttachMotion,
     duration_s: f64,
     rate_hz: f64,
 ) -> Result<Vec<Points>, SimulateError> {
-    let candidate = Candidate::new(rope, motion).with_extras(extras);
     let options = SimOptions {
         frames: FrameTimes {
             first_s: 0.0,
@@ -165,7 +162,7 @@ fn paths(
         },
         ..SimOptions::new(5e-4, Precision::F64, duration_s)
     };
-    let rollouts = roll_out(&[candidate], &options)?;
+    let rollouts = roll_out(&[Candidate::new(rope, motion)], &options)?;
     let nodes = &rollouts[0].nodes;
     let point = |frame: usize, k: usize| {
         let place = k as f64 * (nodes.nodes() - 1) as f64 / (KEYPOINTS - 1) as f64;
@@ -182,13 +179,7 @@ fn paths(
 /// Films a rope with extras and the errors of recording `index` of `seed`.
 fn film(rig: &TrialRig, rope: &RealRope, seed: u64, index: u64) -> anyhow::Result<Filmed> {
     let duration_s = rig.motion.duration_s();
-    let paths = paths(
-        &rope.params,
-        rope.extras,
-        &rig.motion,
-        duration_s,
-        FILM_RATE_HZ,
-    )?;
+    let paths = paths(&rope.params, &rig.motion, duration_s, FILM_RATE_HZ)?;
     let points = paths.iter().flatten();
     let positions = points.flat_map(|p| [p.x as f32, p.y as f32, p.z as f32]);
     let (period_s, positions) = (1.0 / FILM_RATE_HZ, positions.collect());
@@ -209,12 +200,11 @@ fn compare(
     let filmed = film(rig, rope, seed, index)?;
     let found = rig.fit(&filmed, index, &experiment.options)?;
     let arm = PlannedArm::new(*throw, Pole::default());
-    let moved =
-        |rope: &RopeParams, extras: RopeExtras| paths(rope, extras, &arm, COMPARED_S, RATE_HZ);
-    let truth = moved(&rope.params, rope.extras)?;
-    let found_paths = moved(&found.params, RopeExtras::NONE)?;
-    let middle = moved(&middle_rope(), RopeExtras::NONE)?;
-    let random = moved(&trial_rope(seed, index), RopeExtras::NONE)?;
+    let moved = |rope: &RopeParams| paths(rope, &arm, COMPARED_S, RATE_HZ);
+    let truth = moved(&rope.params)?;
+    let found_paths = moved(&found.params)?;
+    let middle = moved(&middle_rope())?;
+    let random = moved(&trial_rope(seed, index))?;
     Ok(FidelityRow {
         name: rope.name.clone(),
         frequency_correlation: spectra_correlation(&truth, &found_paths),
@@ -309,8 +299,8 @@ mod tests {
         assert_eq!(ropes.len(), 10);
         for rope in ropes {
             assert!(rope.params.validate().is_ok() && rope.params.links > 26);
-            assert!(rope.extras.air_drag.is_some(), "{rope:?}");
-            assert!(rope.extras.mass_slope.abs() >= 0.1, "{rope:?}");
+            assert!(rope.params.beyond().air_drag.is_some(), "{rope:?}");
+            assert!(rope.params.beyond().mass_slope.abs() >= 0.1, "{rope:?}");
         }
     }
 }

@@ -17,7 +17,7 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use rope_sim::{RopeExtras, SimulateError};
+use rope_sim::SimulateError;
 use shared_types::{RopeParams, StereoCamera};
 use swing::Swing;
 
@@ -46,10 +46,8 @@ fn start_s(frame: usize) -> f64 {
 /// What is drawn for a film besides its room.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// The rope.
+    /// The rope, with physics beyond its nine parameters.
     pub rope: RopeParams,
-    /// What it has beyond its nine parameters.
-    pub extras: RopeExtras,
     /// The camera that films.
     pub camera: StereoCamera,
     /// What a calibration says about it.
@@ -75,9 +73,9 @@ impl Setting {
             1.6..4.0
         };
         rope.lead_radius_m = (rope.radius_m * rng.random_range(times)).min(0.03);
-        let extras = swing::extras(&mut rng);
+        let rope = rope.with_extras(swing::extras(&mut rng));
         let film_s = FRAMES as f64 / FRAME_RATE_HZ;
-        let swing = Swing::of(&rope, extras, film_s + AFTER_S)?;
+        let swing = Swing::of(&rope, film_s + AFTER_S)?;
         let looks = (film_s / LOOK_S) as usize;
         let swept: Vec<_> = (0..looks)
             .flat_map(|i| swing.at(i as f64 * LOOK_S))
@@ -87,7 +85,6 @@ impl Setting {
             calibrated: camera::calibrated(&mut rng, &camera),
             camera,
             rope,
-            extras,
             film_late_s: rng.random_range(-0.005..=0.005),
             joints_late_s: rng.random_range(0.0..=0.008),
             joints_std_rad: rng.random_range(5e-5..4e-4),

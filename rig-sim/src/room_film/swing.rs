@@ -3,11 +3,8 @@
 use crate::wiggle_film::attach;
 use nalgebra::Vector3;
 use rand::{Rng, RngExt};
-use rope_sim::{
-    AirDrag, Candidate, FrameTimes, NodeTrack, Precision, RopeExtras, SimOptions, SimulateError,
-    roll_out,
-};
-use shared_types::RopeParams;
+use rope_sim::{Candidate, FrameTimes, NodeTrack, Precision, SimOptions, SimulateError, roll_out};
+use shared_types::{AirDrag, RopeExtras, RopeParams};
 
 const STEP_S: f64 = 2e-4;
 /// Time between two kept places (s).
@@ -21,11 +18,7 @@ pub(super) struct Swing {
 
 impl Swing {
     /// Simulates a rope from its rest to `end_s` after the wiggle's beginning.
-    pub(super) fn of(
-        rope: &RopeParams,
-        extras: RopeExtras,
-        end_s: f64,
-    ) -> Result<Self, SimulateError> {
+    pub(super) fn of(rope: &RopeParams, end_s: f64) -> Result<Self, SimulateError> {
         let options = SimOptions {
             frames: FrameTimes {
                 first_s: 0.0,
@@ -34,8 +27,7 @@ impl Swing {
             },
             ..SimOptions::new(STEP_S, Precision::F64, end_s)
         };
-        let rope = Candidate::new(rope, &attach).with_extras(extras);
-        let mut rolled = roll_out(&[rope], &options)?;
+        let mut rolled = roll_out(&[Candidate::new(rope, &attach)], &options)?;
         let nodes = rolled.swap_remove(0).nodes;
         Ok(Self { nodes })
     }
@@ -76,5 +68,6 @@ pub(super) fn extras(rng: &mut impl Rng) -> RopeExtras {
         air_drag: Some(air_drag),
         rest_curvature_per_m: [bend(), bend(), 0.0],
         mass_slope: rng.random_range(-0.12..0.12),
+        friction: None,
     }
 }

@@ -157,7 +157,7 @@ fn down(q: &UnitQuaternion<f64>) -> Vector3<f64> {
 mod tests {
     use super::super::{hanging_links, hanging_straight, weights_nm};
     use super::*;
-    use crate::extras::RopeExtras;
+    use shared_types::RopeExtras;
 
     #[test]
     fn no_curvature_is_the_plane_curve() {
@@ -169,7 +169,7 @@ mod tests {
             rest_curvature_per_m: [1e-12, 0.0, 0.0],
             ..RopeExtras::NONE
         };
-        let almost = hanging_links(&rope, &extras, &attach);
+        let almost = hanging_links(&rope.with_extras(extras), &attach);
         for (a, b) in straight.iter().zip(&almost) {
             let same: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
             assert!(same.abs() > 1.0 - 1e-12);

@@ -9,22 +9,72 @@
 
 mod curved;
 
-use crate::extras::RopeExtras;
 use crate::kernel::GRAVITY_M_S2;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use shared_types::RopeParams;
+use crate::rollout::Sway;
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use shared_types::{RopeExtras, RopeParams};
 
 /// Most Newton steps; ten are typical.
 const MAX_ITERATIONS: usize = 200;
 
+/// Turn of gravity between two equilibria whose difference gives a sway's shape (rad).
+const SWAY_STEP_RAD: f64 = 1e-4;
+
+/// A rope's state at the start.
+pub(crate) struct StartState {
+    /// Attitudes of the links, scalar first, link to world.
+    pub(crate) attitudes: Vec<[f64; 4]>,
+    /// Their angular velocities (rad/s, world); empty at rest.
+    pub(crate) rates_rad_s: Vec<[f64; 3]>,
+}
+
+impl StartState {
+    /// At rest.
+    pub(crate) fn at_rest(attitudes: Vec<[f64; 4]>) -> Self {
+        Self {
+            attitudes,
+            rates_rad_s: Vec::new(),
+        }
+    }
+}
+
+/// A rope that swings below an attach frame of attitude `r_attach`.
+pub(crate) fn swaying_links(rope: &RopeParams, r_attach: &Matrix3<f64>, sway: &Sway) -> StartState {
+    // Gravity turned is the attach frame turned back, seen from a turned world.
+    let hanging = |angle_rad: [f64; 2]| -> Vec<UnitQuaternion<f64>> {
+        let [x, y] = angle_rad;
+        let turn = Rotation3::from_scaled_axis(Vector3::new(x, y, 0.0));
+        let links = hanging_links(rope, &(turn.matrix().transpose() * r_attach));
+        let turn = UnitQuaternion::from_rotation_matrix(&turn);
+        let turned = |[w, x, y, z]: [f64; 4]| {
+            turn * UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
+        };
+        links.into_iter().map(turned).collect()
+    };
+    let here = hanging(sway.angle_rad);
+    let mut rates = vec![Vector3::zeros(); here.len()];
+    for axis in 0..2 {
+        if sway.rate_rad_s[axis] == 0.0 {
+            continue;
+        }
+        let mut beside = sway.angle_rad;
+        beside[axis] += SWAY_STEP_RAD;
+        for ((rate, from), to) in rates.iter_mut().zip(&here).zip(hanging(beside)) {
+            let shape = (to * from.inverse()).scaled_axis() / SWAY_STEP_RAD;
+            *rate += shape * sway.rate_rad_s[axis];
+        }
+    }
+    StartState {
+        attitudes: here.iter().map(|q| [q.w, q.i, q.j, q.k]).collect(),
+        rates_rad_s: rates.into_iter().map(Into::into).collect(),
+    }
+}
+
 /// Attitudes of the links (scalar first, link to world), hanging still from an
 /// attach frame of attitude `r_attach`.
-pub(crate) fn hanging_links(
-    rope: &RopeParams,
-    extras: &RopeExtras,
-    r_attach: &Matrix3<f64>,
-) -> Vec<[f64; 4]> {
-    let weight_nm = weights_nm(rope, extras);
+pub(crate) fn hanging_links(rope: &RopeParams, r_attach: &Matrix3<f64>) -> Vec<[f64; 4]> {
+    let extras = rope.beyond();
+    let weight_nm = weights_nm(rope, &extras);
     let straight = hanging_straight(rope, &weight_nm, r_attach);
     let curvature = Vector3::from(extras.rest_curvature_per_m);
     if curvature == Vector3::zeros() {
@@ -182,7 +232,7 @@ mod tests {
     #[test]
     fn links_start_from_the_attach_frame_and_bend_down() {
         let attach = nalgebra::Rotation3::from_euler_angles(0.4, 0.7, -1.0);
-        let links = hanging_links(&rope(), &RopeExtras::NONE, attach.matrix());
+        let links = hanging_links(&rope(), attach.matrix());
         let z = |q: [f64; 4]| {
             let q =
                 UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));

@@ -83,7 +83,11 @@ impl<V: Lanes> Joints<V> {
             self.child.q.times_conj(parent.q)
         };
         let pull = self.child.pull.sub(parent.pull);
-        space.y = turn.v.scale_sub(spring(rope, turn.w), pull);
+        let torque = turn.v.scale_sub(spring(rope, turn.w), pull);
+        space.y = match loads.joint_moment(nearer.len()) {
+            Some(moment) => moment.scale_sub(rope.per_resistance, torque),
+            None => torque,
+        };
         self.child = parent;
     }
 }

@@ -3,7 +3,7 @@
 use crate::base_path::steps_between_jumps;
 use crate::error::SimulateError;
 use crate::motion::AttachMotion;
-use crate::rollout::Candidate;
+use crate::rollout::{Candidate, Sway};
 use shared_types::RopeParams;
 
 /// Step lengths tried, relative to the one asked for, until motions whose jump times
@@ -18,6 +18,13 @@ pub enum Perturbation<'a> {
     Rope {
         /// The rope.
         rope: RopeParams,
+        /// Its distance from the base's; positive.
+        distance: f64,
+    },
+    /// Another swing at the start.
+    Sway {
+        /// The swing.
+        sway: Sway,
         /// Its distance from the base's; positive.
         distance: f64,
     },
@@ -86,6 +93,7 @@ impl<'a> Family<'a> {
         for (index, perturbation) in self.perturbations.iter().enumerate() {
             let (candidate, distance) = match perturbation {
                 Perturbation::Rope { rope, distance } => (Candidate { rope, ..base }, *distance),
+                Perturbation::Sway { sway, distance } => (base.with_sway(*sway), *distance),
                 Perturbation::Motion { motion, distance } => (
                     Candidate {
                         motion: *motion,

@@ -14,10 +14,10 @@ use arm_model::kinematics::FrameMotion;
 use arm_model::{JointTrajectory, JointVector, Pole};
 use nalgebra::{Rotation3, Vector3};
 use rope_sim::{
-    AirDrag, AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, Scene,
-    SimOptions, Start, roll_out_in,
+    AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, Rollout, Scene, SimOptions, Start,
+    roll_out_in,
 };
-use shared_types::RopeParams;
+use shared_types::{AirDrag, RopeParams};
 
 pub const G_M_S2: f64 = 9.81;
 

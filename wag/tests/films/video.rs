@@ -41,6 +41,7 @@ fn truth(folder: &Path) -> RopeParams {
         lead_mass_kg: number("lead_mass_kg"),
         lead_radius_m: number("lead_radius_m"),
         link_extra_scale: CYLINDER_SCALE,
+        extras: None,
     }
 }
 

@@ -77,6 +77,7 @@ pub(super) fn rope(x: &Point, links: u32) -> RopeParams {
         lead_mass_kg: MASS_PER_LENGTH * x[TIP_MASS].exp(),
         lead_radius_m: 0.02,
         link_extra_scale: 0.85,
+        extras: None,
     }
 }
 

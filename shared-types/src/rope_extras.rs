@@ -1,0 +1,184 @@
+//! What a rope may have beyond the paper's nine parameters: air drag, a rest curvature,
+//! mass that is uneven along it and dry friction in bending. Off by default.
+
+use crate::rope::{RopeError, RopeParams};
+use serde::{Deserialize, Serialize};
+
+/// Drag of still air on the links and the lead, quadratic in the speed.
+///
+/// A link of length s and radius r feels `1/2 rho 2 r s (c_n |v_n| v_n + c_t |v_t| v_t)`
+/// against its centre's velocity, split into parts across and along the link; the
+/// lead `1/2 rho pi r_L² c_L |v| v`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AirDrag {
+    /// Density of the air (kg/m³), about 1.2.
+    pub air_density_kg_m3: f64,
+    /// Coefficient across a link, on its diameter times length (1), about 1.1.
+    pub normal_coefficient: f64,
+    /// Coefficient along a link, on the same area (1), about 0.02.
+    pub tangential_coefficient: f64,
+    /// Coefficient of the lead, on its cross section (1), about 0.5.
+    pub lead_coefficient: f64,
+}
+
+/// Dry friction between a rope's strands: hysteresis in bending.
+///
+/// Dahl's model (1968) in every joint: its moment z follows the joint's turning at the rate
+/// w as `dz/dt = sigma (w - |w| z / z_max)`. It starts as a spring, slips as it nears z_max,
+/// and holds where the joint stands still. With the greatest moment and the curvature per
+/// length given, the motion hardly depends on the number of links.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BendingFriction {
+    /// Greatest moment z_max (N m).
+    pub moment_max_nm: f64,
+    /// Change of curvature over which it comes up, `z_max / (sigma s)` (rad/m).
+    pub slip_curvature_per_m: f64,
+}
+
+/// Physics of a rope beyond its nine parameters. TOML form: table `extras` of `rope.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RopeExtras {
+    /// Curvature of the unloaded rope (rad/m), a rotation vector per length in the
+    /// link's frame, the same all along: every joint, the first included, rests
+    /// turned by `exp(curvature s)`. Zero is a straight rope.
+    pub rest_curvature_per_m: [f64; 3],
+    /// Unevenness of the rope's mass: mass per length goes in a straight line from
+    /// `1 - mass_slope` times its mean at the clamp to `1 + mass_slope` times at the free
+    /// end, from -0.95 to 0.95. Zero is an even rope. Sizes and the links' inertia about
+    /// their centres stay.
+    pub mass_slope: f64,
+    /// Drag of still air; `None` is vacuum, as in the paper.
+    pub air_drag: Option<AirDrag>,
+    /// Dry friction in bending; `None` is a rope without.
+    pub friction: Option<BendingFriction>,
+}
+
+impl RopeExtras {
+    /// The plain rope of nine parameters.
+    pub const NONE: Self = Self {
+        air_drag: None,
+        rest_curvature_per_m: [0.0; 3],
+        mass_slope: 0.0,
+        friction: None,
+    };
+
+    /// Mass of a link, counted from the clamp, as a multiple of the mean of `links` of them.
+    #[must_use]
+    pub fn mass_factor(&self, link: u32, links: u32) -> f64 {
+        let place = (f64::from(link) + 0.5) / f64::from(links);
+        1.0 + self.mass_slope * (2.0 * place - 1.0)
+    }
+
+    /// Refuses the first number that is not finite or not physical.
+    pub(crate) fn validate(&self) -> Result<(), RopeError> {
+        let drag = self.air_drag.map_or([0.0; 4], |drag| {
+            [
+                drag.air_density_kg_m3,
+                drag.normal_coefficient,
+                drag.tangential_coefficient,
+                drag.lead_coefficient,
+            ]
+        });
+        let friction = self.friction.map_or([0.0, 1.0], |friction| {
+            [friction.moment_max_nm, friction.slip_curvature_per_m]
+        });
+        let [x, y, z] = self.rest_curvature_per_m;
+        [
+            ("extras.rest_curvature_per_m", x, -1e3, 1e3),
+            ("extras.rest_curvature_per_m", y, -1e3, 1e3),
+            ("extras.rest_curvature_per_m", z, -1e3, 1e3),
+            ("extras.mass_slope", self.mass_slope, -0.95, 0.95),
+            ("extras.air_drag.air_density_kg_m3", drag[0], 0.0, 1e4),
+            ("extras.air_drag.normal_coefficient", drag[1], 0.0, 1e4),
+            ("extras.air_drag.tangential_coefficient", drag[2], 0.0, 1e4),
+            ("extras.air_drag.lead_coefficient", drag[3], 0.0, 1e4),
+            ("extras.friction.moment_max_nm", friction[0], 0.0, 10.0),
+            (
+                "extras.friction.slip_curvature_per_m",
+                friction[1],
+                1e-3,
+                1e3,
+            ),
+        ]
+        .into_iter()
+        .try_for_each(|(key, value, min, max)| RopeError::unless_within(key, value, min, max))
+    }
+}
+
+impl RopeParams {
+    /// The rope's physics beyond its nine parameters.
+    #[must_use]
+    pub fn beyond(&self) -> RopeExtras {
+        self.extras.unwrap_or(RopeExtras::NONE)
+    }
+
+    /// The same rope with other physics beyond its nine parameters.
+    #[must_use]
+    pub fn with_extras(self, extras: RopeExtras) -> Self {
+        let extras = (extras != RopeExtras::NONE).then_some(extras);
+        Self { extras, ..self }
+    }
+
+    /// Stiffness that dry friction adds to a joint until it slips (N m/rad).
+    #[must_use]
+    pub fn friction_stiffness_nm_per_rad(&self) -> f64 {
+        self.beyond().friction.map_or(0.0, |friction| {
+            friction.moment_max_nm / (friction.slip_curvature_per_m * self.link_length_m())
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rope() -> RopeParams {
+        RopeParams::from_array([23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0])
+    }
+
+    #[test]
+    fn extras_are_checked_by_name_and_none_is_left_out() {
+        assert_eq!(rope().with_extras(RopeExtras::NONE), rope());
+        let slope = RopeExtras {
+            mass_slope: 1.0,
+            ..RopeExtras::NONE
+        };
+        let refusal = rope().with_extras(slope).validate().unwrap_err();
+        assert!(
+            refusal.to_string().contains("extras.mass_slope"),
+            "{refusal}"
+        );
+        let friction = BendingFriction {
+            moment_max_nm: f64::NAN,
+            slip_curvature_per_m: 0.5,
+        };
+        let extras = RopeExtras {
+            friction: Some(friction),
+            ..RopeExtras::NONE
+        };
+        assert!(rope().with_extras(extras).validate().is_err());
+    }
+
+    #[test]
+    fn a_rope_file_without_extras_reads_as_before_and_one_with_them_comes_back() {
+        let plain = toml::to_string(&rope()).unwrap();
+        assert!(!plain.contains("extras"));
+        assert_eq!(toml::from_str::<RopeParams>(&plain).unwrap(), rope());
+        let extras = RopeExtras {
+            rest_curvature_per_m: [0.3, -0.2, 0.0],
+            friction: Some(BendingFriction {
+                moment_max_nm: 0.002,
+                slip_curvature_per_m: 0.5,
+            }),
+            ..RopeExtras::NONE
+        };
+        let curled = rope().with_extras(extras);
+        let text = toml::to_string(&curled).unwrap();
+        assert_eq!(toml::from_str::<RopeParams>(&text).unwrap(), curled);
+        let bytes = postcard::to_allocvec(&curled).unwrap();
+        assert_eq!(postcard::from_bytes::<RopeParams>(&bytes).unwrap(), curled);
+    }
+}
