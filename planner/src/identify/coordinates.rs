@@ -5,18 +5,22 @@
 //! These are the coordinates: a change of the link count then leaves the motion
 //! nearly alone, so that the count can be fitted like a number and rounded. The
 //! common factor is left to [`super::scale`].
+//!
+//! The last coordinates are what real ropes have beyond the nine parameters, and how the
+//! rope swings when the film begins ([`Coordinates::beyond`]); a plain fit leaves them at 0.
 
 use super::camera_pose::CORRECTIONS;
 use super::clock::ClockWindow;
 use crate::observation::Appearance;
 use nalgebra::{SMatrix, SVector};
-use shared_types::RopeParams;
+use rope_sim::Sway;
 use shared_types::rope::RANGES;
+use shared_types::{BendingFriction, RopeExtras, RopeParams};
 
-/// Coordinates that need a simulation of their own, the link count left out.
-pub(super) const ROPE: usize = 6;
 /// Number of coordinates.
-pub(super) const FREE: usize = 14;
+pub(super) const FREE: usize = 22;
+/// Number of those that a plain fit moves, the first ones.
+pub(super) const PLAIN: usize = 14;
 
 /// Rope length (m).
 pub(super) const LENGTH: usize = 0;
@@ -36,6 +40,37 @@ pub(super) const LINKS: usize = 6;
 pub(super) const CLOCK: usize = 7;
 /// First of the six corrections of the camera's place.
 pub(super) const CAMERA: usize = 8;
+/// First of the rest curvature's two components across the rope (rad/m).
+pub(super) const CURVATURE: usize = 14;
+/// Greatest moment of the friction over the bending stiffness (1/m): the curvature that it
+/// can hold.
+pub(super) const FRICTION: usize = 16;
+/// Logarithm of the change of curvature over which the friction comes up (1/m).
+pub(super) const SLIP: usize = 17;
+/// First of the two angles (rad) of the swing at the film's begin, their rates (rad/s)
+/// behind them.
+pub(super) const SWAY: usize = 18;
+
+/// Coordinates that need a simulation of their own, the link count left out: those of a
+/// plain fit first.
+pub(super) const SIMULATED: [usize; 14] = [
+    LENGTH,
+    STIFFNESS,
+    DAMPING,
+    LEAD_MASS,
+    LEAD_RADIUS,
+    INERTIA,
+    CURVATURE,
+    CURVATURE + 1,
+    FRICTION,
+    SLIP,
+    SWAY,
+    SWAY + 1,
+    SWAY + 2,
+    SWAY + 3,
+];
+/// How many of them a plain fit moves.
+pub(super) const SIMULATED_PLAIN: usize = 6;
 
 /// A point of the fit.
 pub(super) type Point = SVector<f64, FREE>;
@@ -73,6 +108,8 @@ pub(super) enum Reach {
 /// Box of the fit, its prior, and the way from its points to ropes.
 #[derive(Debug, Clone)]
 pub(super) struct Coordinates {
+    /// How many of the coordinates move, the first ones.
+    pub(super) fitted: usize,
     pub(super) lower: Point,
     pub(super) upper: Point,
     /// Mean and deviation of the prior used while fitting. Where the ranges are the
@@ -96,6 +133,28 @@ pub(super) fn point_of(rope: &RopeParams) -> Point {
     x
 }
 
+/// What a rope with this bending stiffness (N m²) has beyond the nine parameters at a
+/// point; none at a plain fit's.
+pub(super) fn extras_of(x: &Point, bending_stiffness_nm2: f64) -> Option<RopeExtras> {
+    let is_plain = (PLAIN..FREE).all(|i| x[i] == 0.0);
+    (!is_plain).then(|| RopeExtras {
+        rest_curvature_per_m: [x[CURVATURE], x[CURVATURE + 1], 0.0],
+        friction: Some(BendingFriction {
+            moment_max_nm: x[FRICTION] * bending_stiffness_nm2,
+            slip_curvature_per_m: x[SLIP].exp(),
+        }),
+        ..RopeExtras::NONE
+    })
+}
+
+/// How the rope swings at the film's begin.
+pub(super) fn sway_of(x: &Point) -> Sway {
+    Sway {
+        angle_rad: [x[SWAY], x[SWAY + 1]],
+        rate_rad_s: [x[SWAY + 2], x[SWAY + 3]],
+    }
+}
+
 /// The rope to simulate at a point, with this many links.
 pub(super) fn simulated_rope(x: &Point, links: u32) -> RopeParams {
     let link_length = x[LENGTH] / f64::from(links);
@@ -110,6 +169,7 @@ pub(super) fn simulated_rope(x: &Point, links: u32) -> RopeParams {
         lead_mass_kg: mu * x[LEAD_MASS].exp(),
         lead_radius_m: x[LEAD_RADIUS],
         link_extra_scale: x[INERTIA],
+        extras: extras_of(x, mu * x[STIFFNESS].exp()),
     }
 }
 
@@ -171,10 +231,11 @@ impl Coordinates {
             ),
         ];
         let mut out = Self {
+            fitted: PLAIN,
             lower: Point::zeros(),
             upper: Point::zeros(),
             prior_mean: Point::zeros(),
-            prior_std: Point::zeros(),
+            prior_std: Point::repeat(1.0),
         };
         for (i, (low, high)) in boxes.into_iter().enumerate() {
             out.lower[i] = low;
@@ -194,6 +255,32 @@ impl Coordinates {
             out.lower[CAMERA + i] = -5.0 * std_dev;
             out.upper[CAMERA + i] = 5.0 * std_dev;
             out.prior_std[CAMERA + i] = *std_dev;
+        }
+        out
+    }
+
+    /// The same with what real ropes have beyond the nine parameters, and a swing at the
+    /// film's begin. The priors are those of ropes that laboratories use.
+    pub(super) fn beyond(&self) -> Self {
+        // Smallest, likeliest, largest value, and the prior's deviation.
+        const BEYOND: [(usize, [f64; 4]); FREE - PLAIN] = [
+            (CURVATURE, [-4.0, 0.0, 4.0, 0.5]),
+            (CURVATURE + 1, [-4.0, 0.0, 4.0, 0.5]),
+            (FRICTION, [0.0, 0.0, 10.0, 0.5]),
+            // From 0.03 to 10 rad/m, about 0.5.
+            (SLIP, [-3.5, -0.7, 2.3, 0.8]),
+            (SWAY, [-0.3, 0.0, 0.3, 0.04]),
+            (SWAY + 1, [-0.3, 0.0, 0.3, 0.04]),
+            (SWAY + 2, [-1.5, 0.0, 1.5, 0.2]),
+            (SWAY + 3, [-1.5, 0.0, 1.5, 0.2]),
+        ];
+        let mut out = self.clone();
+        out.fitted = FREE;
+        for (i, [lower, mean, upper, std_dev]) in BEYOND {
+            out.lower[i] = lower;
+            out.upper[i] = upper;
+            out.prior_mean[i] = mean;
+            out.prior_std[i] = std_dev;
         }
         out
     }

@@ -48,7 +48,14 @@ pub(super) fn descend(
     budget: &mut Budget<'_>,
 ) -> Result<Vec<Iterate>, IdentifyError> {
     let starts: Vec<Point> = starts.iter().map(|x| coordinates.clamped(x)).collect();
-    let (found, simulations) = linearise(film, &starts, near, rules.links, rules.fidelity)?;
+    let (found, simulations) = linearise(
+        film,
+        &starts,
+        near,
+        rules.links,
+        coordinates.fitted,
+        rules.fidelity,
+    )?;
     let iterates: Vec<Iterate> = starts
         .iter()
         .zip(found)
@@ -78,7 +85,14 @@ pub(super) fn go_on(
         }
         let points: Vec<Point> = trials.iter().map(|(_, x)| *x).collect();
         let near: Vec<&Rows> = trials.iter().map(|(i, _)| &iterates[*i].at.rows).collect();
-        let (found, simulations) = linearise(film, &points, &near, rules.links, rules.fidelity)?;
+        let (found, simulations) = linearise(
+            film,
+            &points,
+            &near,
+            rules.links,
+            coordinates.fitted,
+            rules.fidelity,
+        )?;
         for ((i, x), at) in trials.into_iter().zip(found) {
             let there = at.map(|at| Iterate::new(film, coordinates, rules, x, at));
             iterates[i].judge(there, rules);

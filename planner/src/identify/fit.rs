@@ -1,5 +1,6 @@
 //! One identification by fitting: where it starts, how it is refined, and what comes of it.
 
+use super::beyond::beyond;
 use super::budget::Budget;
 use super::clock::ClockWindow;
 use super::coordinates::{CLOCK, Coordinates, Point, Reach};
@@ -79,7 +80,11 @@ pub(super) fn fit(
 
 /// The fit that is nearer to the film, the second if neither is.
 fn nearer(a: Refined, b: Refined) -> Refined {
-    if a.residual_px < b.residual_px { a } else { b }
+    if a.at.distance_px < b.at.distance_px {
+        a
+    } else {
+        b
+    }
 }
 
 struct Fit<'a> {
@@ -105,7 +110,7 @@ impl Fit<'_> {
             return Ok((near, PROPOSED));
         }
         let searched = self.searched()?;
-        Ok(if searched.residual_px < near.residual_px {
+        Ok(if searched.at.distance_px < near.at.distance_px {
             (searched, SEARCHED)
         } else {
             (near, PROPOSED)
@@ -120,7 +125,9 @@ impl Fit<'_> {
         distance_px: f64,
     ) -> Result<Refined, IdentifyError> {
         let noise_px = distance_px / 2.0_f64.sqrt();
-        refine(&self.film, coordinates, start, noise_px, &mut self.budget)
+        let (film, budget) = (&self.film, &mut self.budget);
+        let plain = refine(film, coordinates, &[*start], noise_px, budget)?;
+        beyond(film, coordinates, plain, budget)
     }
 
     /// The global search, refined.
@@ -148,7 +155,7 @@ impl Fit<'_> {
         RopeEstimate {
             params,
             std_dev: std_dev(&posterior),
-            residual_px: fit.residual_px,
+            residual_px: fit.at.distance_px,
             method: label.try_into().unwrap_or_default(),
             simulations: u32::try_from(self.budget.simulations).unwrap_or(u32::MAX),
             seed: self.film.options.seed,

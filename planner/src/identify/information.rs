@@ -83,7 +83,7 @@ pub fn information(
     };
     let coordinates = seen.coordinates(clock, Reach::Ranges);
     let x = point_of(rope);
-    let (mut at, _) = linearise(&seen, &[x], &[], rope.links, fidelity)?;
+    let (mut at, _) = linearise(&seen, &[x], &[], rope.links, coordinates.fitted, fidelity)?;
     let Some(Some(at)) = at.pop() else {
         return Ok(None);
     };

@@ -3,8 +3,8 @@
 
 use super::camera_pose::{CORRECTIONS, View};
 use super::coordinates::{
-    CAMERA, CLOCK, Coordinates, DAMPING, FREE, INERTIA, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS,
-    Point, ROPE, STIFFNESS, Square, link_range, simulated_rope,
+    CAMERA, CLOCK, Coordinates, FREE, LINKS, Point, SIMULATED, SIMULATED_PLAIN, SWAY, Square,
+    link_range, simulated_rope, sway_of,
 };
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film, Grid, Instant, Sighting, is_finite, sample_s};
@@ -12,14 +12,18 @@ use super::noise::{Noise, RESIDUAL, Row, Rows};
 use crate::workers::map_in_order;
 use nalgebra::SMatrix;
 use rope_sim::sensitivity::{Family, Perturbation, Sensitivity, sensitivities};
-use rope_sim::{Candidate, NodeTrack, Rollout};
+use rope_sim::{Candidate, NodeTrack, Rollout, Sway};
 use shared_types::RopeParams;
 
 /// Steps of the one-sided differences in double precision: length (m), three
-/// logarithms, lead radius (m), inertia radius (1).
-const FINE_STEPS: [f64; ROPE] = [2e-5, 5e-4, 5e-4, 5e-4, 1e-4, 5e-3];
-/// In single precision.
-const COARSE_STEPS: [f64; ROPE] = [2e-3, 4e-2, 4e-2, 4e-2, 2e-3, 0.0];
+/// logarithms, lead radius (m), inertia radius (1); two curvatures and friction (1/m), the
+/// logarithm of its slip, two angles (rad) and their rates (rad/s). Friction is not smooth:
+/// its steps are longer than rounding asks for.
+const FINE_STEPS: [f64; SIMULATED.len()] = [
+    2e-5, 5e-4, 5e-4, 5e-4, 1e-4, 5e-3, 1e-3, 1e-3, 4e-3, 2e-2, 1e-4, 1e-4, 5e-4, 5e-4,
+];
+/// In single precision, in which only plain fits are made.
+const COARSE_STEPS: [f64; SIMULATED_PLAIN] = [2e-3, 4e-2, 4e-2, 4e-2, 2e-3, 0.0];
 /// Step of the camera's corrections (m, rad) and of the clock (s).
 const CAMERA_STEP: f64 = 1e-4;
 const CLOCK_STEP_S: f64 = 5e-4;
@@ -47,6 +51,8 @@ pub(super) struct Normal {
 #[derive(Debug, Clone)]
 pub(super) struct Linearised {
     pub(super) rows: Rows,
+    /// How many of the coordinates move, the first ones.
+    fitted: usize,
     /// Root mean square distance between seen and simulated keypoints (px).
     pub(super) distance_px: f64,
 }
@@ -60,8 +66,9 @@ struct Pair<'a> {
     span: f64,
 }
 
-/// Residuals and slopes at each point, for ropes of `links` links; `None` where the
-/// rope cannot be simulated or is not in view. Also how many ropes were simulated.
+/// Residuals and slopes over the first `fitted` coordinates at each point, for ropes of
+/// `links` links; `None` where the rope cannot be simulated or is not in view. Also how
+/// many ropes were simulated.
 ///
 /// `near` are the rows of a point nearby, one per point or none at all: the slopes over
 /// the link count, which hardly change and fill no lanes, are taken over from there.
@@ -70,18 +77,23 @@ pub(super) fn linearise(
     points: &[Point],
     near: &[&Rows],
     links: u32,
+    fitted: usize,
     fidelity: Fidelity,
 ) -> Result<(Vec<Option<Linearised>>, usize), IdentifyError> {
+    type Neighbours<'a> = Vec<Perturbation<'a>>;
     let fine = fidelity == Fidelity::Fine;
-    let family = |x: &Point| (simulated_rope(x, links), perturbations(x, links, fine));
-    let mut ropes: Vec<(RopeParams, Vec<Perturbation<'_>>)> = points.iter().map(family).collect();
+    let family = |x: &Point| {
+        let neighbours = perturbations(x, links, fitted, fine);
+        (simulated_rope(x, links), sway_of(x), neighbours)
+    };
+    let mut ropes: Vec<(RopeParams, Sway, Neighbours<'_>)> = points.iter().map(family).collect();
     let counts = neighbour_counts(links);
     if fine && near.is_empty() {
-        let of = |x| counts.map(|n| (simulated_rope(x, n), Vec::new()));
+        let of = |x| counts.map(|n| (simulated_rope(x, n), sway_of(x), Vec::new()));
         ropes.extend(points.iter().flat_map(of));
     }
-    let families = ropes.iter().map(|(rope, perturbations)| Family {
-        base: Candidate::new(rope, film.observation.motion),
+    let families = ropes.iter().map(|(rope, sway, perturbations)| Family {
+        base: Candidate::new(rope, film.observation.motion).with_sway(*sway),
         perturbations,
     });
     let families: Vec<Family<'_>> = families.collect();
@@ -104,7 +116,7 @@ pub(super) fn linearise(
         is_finite(&at.base)
             .then(|| {
                 let near = near.get(i).copied();
-                compare(film, x, links, &at.base, &pairs, near, fidelity)
+                compare(film, x, links, &at.base, &pairs, near, (fitted, fidelity))
             })
             .flatten()
     });
@@ -120,27 +132,31 @@ pub(super) fn neighbour_counts(links: u32) -> [u32; 2] {
     ]
 }
 
-fn perturbations(x: &Point, links: u32, fine: bool) -> Vec<Perturbation<'static>> {
-    let steps = if fine { FINE_STEPS } else { COARSE_STEPS };
-    [LENGTH, STIFFNESS, DAMPING, LEAD_MASS, LEAD_RADIUS, INERTIA]
+fn perturbations(x: &Point, links: u32, fitted: usize, fine: bool) -> Vec<Perturbation<'static>> {
+    let steps: &[f64] = if fine { &FINE_STEPS } else { &COARSE_STEPS };
+    SIMULATED
         .into_iter()
-        .filter(|i| steps[*i] > 0.0)
-        .map(|i| {
-            let mut moved = *x;
-            moved[i] += steps[i];
-            Perturbation::Rope {
-                rope: simulated_rope(&moved, links),
-                distance: steps[i],
+        .zip(steps)
+        .filter(|(i, step)| *i < fitted && **step > 0.0)
+        .map(|(i, step)| {
+            let (mut moved, distance) = (*x, *step);
+            moved[i] += step;
+            if i >= SWAY {
+                let sway = sway_of(&moved);
+                return Perturbation::Sway { sway, distance };
             }
+            let rope = simulated_rope(&moved, links);
+            Perturbation::Rope { rope, distance }
         })
         .collect()
 }
 
-/// Neighbours are in the order of the rope's coordinates.
+/// Neighbours are in the order of [`SIMULATED`].
 fn pairs(at: &Sensitivity) -> Vec<Pair<'_>> {
-    let usable = at.neighbours.iter().enumerate().filter(|(_, n)| n.valid);
-    usable
-        .map(|(coordinate, n)| Pair {
+    let neighbours = at.neighbours.iter().zip(SIMULATED);
+    neighbours
+        .filter(|(n, _)| n.valid)
+        .map(|(n, coordinate)| Pair {
             coordinate,
             to: &n.rollout,
             from: None,
@@ -173,7 +189,7 @@ fn compare(
     base: &Rollout,
     pairs: &[Pair<'_>],
     near: Option<&Rows>,
-    fidelity: Fidelity,
+    (fitted, fidelity): (usize, Fidelity),
 ) -> Option<Linearised> {
     let c = corrections(x);
     let comparison = Comparison {
@@ -210,9 +226,11 @@ fn compare(
         count += 1.0;
     }
     let distance_px = (sum / f64::max(count, 1.0)).sqrt();
-    distance_px
-        .is_finite()
-        .then_some(Linearised { rows, distance_px })
+    distance_px.is_finite().then_some(Linearised {
+        rows,
+        fitted,
+        distance_px,
+    })
 }
 
 impl Comparison<'_> {
@@ -280,10 +298,12 @@ impl Linearised {
     pub(super) fn normal(&self, film: &Film<'_>, fidelity: Fidelity, noise: &Noise) -> Normal {
         let grid: &Grid = film.grid(fidelity);
         let mut rows = self.rows.clone();
-        noise.whiten(grid, &mut rows);
+        noise.whiten(grid, &mut rows, self.fitted);
         let parts: Vec<&[Option<[Row; 2]>]> =
             rows.chunks(FRAMES_OF_PART * grid.keypoints).collect();
-        let sums = map_in_order(&parts, film.options.threads, |part| accumulate(part));
+        let sums = map_in_order(&parts, film.options.threads, |part| {
+            accumulate(part, self.fitted)
+        });
         let mut out = Normal {
             information: Square::zeros(),
             gradient: Point::zeros(),
@@ -301,8 +321,12 @@ impl Linearised {
     }
 }
 
-/// Weighted sum of the outer products of rows, and Huber's cost.
-fn accumulate(rows: &[Option<[Row; 2]>]) -> (SMatrix<f64, { FREE + 1 }, { FREE + 1 }>, f64) {
+/// Weighted sum of the outer products of rows in the columns of the first `fitted`
+/// coordinates and the residual, and Huber's cost.
+fn accumulate(
+    rows: &[Option<[Row; 2]>],
+    fitted: usize,
+) -> (SMatrix<f64, { FREE + 1 }, { FREE + 1 }>, f64) {
     let mut sum = SMatrix::<f64, { FREE + 1 }, { FREE + 1 }>::zeros();
     let mut cost = 0.0;
     for row in rows.iter().flatten() {
@@ -311,9 +335,9 @@ fn accumulate(rows: &[Option<[Row; 2]>]) -> (SMatrix<f64, { FREE + 1 }, { FREE +
         // Huber's loss is d² (2 - w) w / 2 with w the influence.
         cost += 0.5 * distance * distance * weight * (2.0 - weight);
         for axis in row {
-            for column in 0..=FREE {
+            for column in (0..fitted).chain([RESIDUAL]) {
                 let scaled = weight * axis[column];
-                for line in 0..=column {
+                for line in (0..column.min(fitted)).chain([column]) {
                     sum[(line, column)] += scaled * axis[line];
                 }
             }

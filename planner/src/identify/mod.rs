@@ -9,6 +9,7 @@
 //! those, and [`scale`] adds the factor that the parameter ranges, or a weighed lead,
 //! make likely. The result is a posterior over the nine parameters.
 
+mod beyond;
 mod budget;
 mod camera_pose;
 mod clock;

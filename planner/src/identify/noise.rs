@@ -56,24 +56,25 @@ impl Noise {
         self
     }
 
-    /// Divides by the noise and takes the correlations out, in place.
-    pub(super) fn whiten(&self, grid: &Grid, rows: &mut Rows) {
+    /// Divides by the noise and takes the correlations out, in place, of the slopes over
+    /// the first `fitted` coordinates and of the residual.
+    pub(super) fn whiten(&self, grid: &Grid, rows: &mut Rows, fitted: usize) {
         let k = grid.keypoints;
         for (axis, noise) in self.axes.iter().enumerate() {
             for cell in rows.iter_mut().flatten() {
-                for value in &mut cell[axis] {
-                    *value /= noise.sigma_px;
+                for column in (0..fitted).chain([RESIDUAL]) {
+                    cell[axis][column] /= noise.sigma_px;
                 }
             }
             // From the end, so that every difference is taken with the original.
             for index in (k..rows.len()).rev() {
                 if grid.follows[index / k] {
-                    subtract(rows, index, index - k, axis, noise.in_time);
+                    subtract(rows, [index, index - k], (axis, fitted), noise.in_time);
                 }
             }
             for index in (1..rows.len()).rev() {
                 if index % k != 0 {
-                    subtract(rows, index, index - 1, axis, noise.along_rope);
+                    subtract(rows, [index, index - 1], (axis, fitted), noise.along_rope);
                 }
             }
         }
@@ -81,14 +82,19 @@ impl Noise {
 }
 
 /// `(row - ρ before) / sqrt(1 - ρ²)`: what is new at `index`.
-fn subtract(rows: &mut Rows, index: usize, before: usize, axis: usize, correlation: f64) {
+fn subtract(
+    rows: &mut Rows,
+    [index, before]: [usize; 2],
+    (axis, fitted): (usize, usize),
+    correlation: f64,
+) {
     let (head, tail) = rows.split_at_mut(index);
     let (Some(Some(before)), Some(Some(row))) = (head.get(before), tail.first_mut()) else {
         return;
     };
     let scale = 1.0 / (1.0 - correlation * correlation).sqrt();
-    for (value, old) in row[axis].iter_mut().zip(&before[axis]) {
-        *value = (*value - correlation * old) * scale;
+    for column in (0..fitted).chain([RESIDUAL]) {
+        row[axis][column] = (row[axis][column] - correlation * before[axis][column]) * scale;
     }
 }
 

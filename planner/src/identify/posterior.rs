@@ -8,7 +8,8 @@
 //! drawn ropes.
 
 use super::coordinates::{
-    DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, STIFFNESS, link_range, parameter,
+    DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, Point, STIFFNESS, extras_of, link_range,
+    parameter,
 };
 use super::film::Film;
 use super::refine::Refined;
@@ -60,7 +61,7 @@ pub(super) fn posterior(fit: &Refined, film: &Film<'_>) -> (RopeParams, RopePost
         d.weight /= total;
     }
     let posterior = summarise(&draws, fit);
-    let params = likeliest(&draws, &posterior, film.options.lead_mass_kg);
+    let params = likeliest(&draws, &posterior, film.options.lead_mass_kg, &fit.x);
     (params, posterior)
 }
 
@@ -262,8 +263,13 @@ fn ambiguities(covariance: &[[f64; ROPE_PARAMETERS]; ROPE_PARAMETERS]) -> Vec<Am
 }
 
 /// One rope whose ratios are those of the fit: means of the coordinates, medians of the
-/// link count and of the common factor.
-fn likeliest(draws: &[Draw], posterior: &RopePosterior, lead_mass_kg: Option<f64>) -> RopeParams {
+/// link count and of the common factor, and what it has beyond the nine parameters.
+fn likeliest(
+    draws: &[Draw],
+    posterior: &RopePosterior,
+    lead_mass_kg: Option<f64>,
+    fitted: &Point,
+) -> RopeParams {
     let mut x = Vector::zeros();
     for d in draws {
         x += d.coordinates * d.weight;
@@ -273,7 +279,7 @@ fn likeliest(draws: &[Draw], posterior: &RopePosterior, lead_mass_kg: Option<f64
     let [median] = quantiles(draws, |d| d.values[parameter::MASS_PER_LENGTH], [0.5]);
     let mu = lead_mass_kg.map_or(median, |m| m / x[3].exp());
     let s = x[0] / links;
-    RopeParams::from_array([
+    let plain = RopeParams::from_array([
         links,
         x[0],
         mu * x[2].exp() / s,
@@ -283,7 +289,11 @@ fn likeliest(draws: &[Draw], posterior: &RopePosterior, lead_mass_kg: Option<f64
         mu * x[3].exp(),
         x[4],
         posterior.mean[parameter::EXTRA_SCALE],
-    ])
+    ]);
+    RopeParams {
+        extras: extras_of(fitted, mu * x[1].exp()),
+        ..plain
+    }
 }
 
 /// One standard deviation per parameter, `None` where the film says next to nothing.

@@ -5,11 +5,11 @@
 //! normal equations, widened where the parts of the film disagree by more than it says.
 
 use super::budget::Budget;
-use super::coordinates::{Coordinates, FREE, Point, Square, middle_links, nearest_links};
+use super::coordinates::{Coordinates, Point, Square, middle_links, nearest_links};
 use super::descent::{DescentRules, Iterate, best, descend, go_on};
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
-use super::linear::Normal;
+use super::linear::{Linearised, Normal};
 use super::noise::Noise;
 
 /// Most steps: until the noise is known, with its first estimate, and with the second at
@@ -24,21 +24,21 @@ const SETTLED: f64 = 5e-3;
 #[derive(Debug, Clone)]
 pub(super) struct Refined {
     pub(super) x: Point,
+    /// Residuals and slopes there.
+    pub(super) at: Linearised,
     /// Covariance of the coordinates, their fitting prior included.
     pub(super) covariance: Square,
-    /// Root mean square distance between seen and simulated keypoints (px).
-    pub(super) residual_px: f64,
     pub(super) noise: Noise,
     /// Factor by which the parts of the film disagree more than the noise says,
     /// variance; 1 or more.
     pub(super) inflation: f64,
 }
 
-/// Refines the likeliest of some starts.
+/// Refines some starts, and what the likeliest of them leads to further.
 pub(super) fn refine(
     film: &Film<'_>,
     coordinates: &Coordinates,
-    start: &Point,
+    starts: &[Point],
     noise_px: f64,
     budget: &mut Budget<'_>,
 ) -> Result<Refined, IdentifyError> {
@@ -54,8 +54,7 @@ pub(super) fn refine(
     };
     let middle = middle_links();
     let first = rules(middle, Noise::white(noise_px), FIRST_STEPS);
-    let starts = [*start];
-    let mut iterate = best(descend(film, coordinates, &starts, &[], &first, budget)?)?;
+    let mut iterate = best(descend(film, coordinates, starts, &[], &first, budget)?)?;
     let second = rules(middle, estimate(&iterate), SECOND_STEPS);
     let again = Iterate::new(film, coordinates, &second, iterate.x, iterate.at);
     iterate = best(go_on(film, coordinates, vec![again], &second, budget)?)?;
@@ -67,11 +66,11 @@ pub(super) fn refine(
     let covariance = (normal.information + coordinates.prior_information())
         .cholesky()
         .map_or_else(|| coordinates.prior_information(), |f| f.inverse());
-    let inflation = disagreement(&normal, &covariance).max(1.0);
+    let inflation = disagreement(&normal, &covariance, coordinates.fitted).max(1.0);
     Ok(Refined {
         x: iterate.x,
+        at: iterate.at,
         covariance,
-        residual_px: iterate.at.distance_px,
         noise,
         inflation,
     })
@@ -79,7 +78,7 @@ pub(super) fn refine(
 
 /// Spread of the gradient over the parts of the film, relative to what the normal
 /// equations expect, averaged over all directions.
-fn disagreement(normal: &Normal, covariance: &Square) -> f64 {
+fn disagreement(normal: &Normal, covariance: &Square, fitted: usize) -> f64 {
     let parts = normal.parts.len() as f64;
     if parts < 3.0 {
         return 1.0;
@@ -90,5 +89,5 @@ fn disagreement(normal: &Normal, covariance: &Square) -> f64 {
         (covariance * d).dot(&d)
     });
     let seen = (covariance * normal.information).trace();
-    spread.sum::<f64>() * parts / (parts - 1.0) / seen.clamp(1.0, FREE as f64)
+    spread.sum::<f64>() * parts / (parts - 1.0) / seen.clamp(1.0, fitted as f64)
 }

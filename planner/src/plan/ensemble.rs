@@ -52,7 +52,10 @@ impl PosteriorEnsemble {
                 for i in 0..N {
                     values[i + 1] = (mean(i).ln() - logs[(i, i)] / 2.0 + shift[i]).exp();
                 }
-                let drawn = RopeParams::from_array(values);
+                let drawn = RopeParams {
+                    extras: rope.extras,
+                    ..RopeParams::from_array(values)
+                };
                 if drawn.validate().is_ok() {
                     drawn
                 } else {

@@ -56,7 +56,7 @@ impl Setup<'_> {
             }
             let at: Vec<&[f64]> = open.iter().map(|i| points[*i].as_slice()).collect();
             let slopes = self.slopes(&at, &rough)?;
-            count.add(open.len() * (1 + self.space.dimensions.count()));
+            count.add(open.len() * (1 + self.space.pose_count()));
             let (mut tried, mut owners) = (Vec::new(), Vec::new());
             for (i, slopes) in open.iter().zip(&slopes) {
                 if let (Some(slopes), Some(approach)) = (slopes, &approaches[*i]) {
@@ -106,7 +106,7 @@ impl Setup<'_> {
     ) -> Result<Vec<Option<DMatrix<f64>>>, PlanError> {
         // Neighbours with other times would be simulated in other steps, and differ by
         // more than the slope: the times stay as they were found.
-        let (n, all_coordinates) = (self.space.dimensions.count(), self.space.count());
+        let (n, all_coordinates) = (self.space.pose_count(), self.space.count());
         let bases = self.motions(points)?;
         let mut moved = Vec::with_capacity(points.len() * n);
         for x in points {

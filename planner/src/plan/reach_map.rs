@@ -66,6 +66,7 @@ impl ReachMap {
         let space = WaypointSpace {
             start: start_pose_for([1.0, 0.0, 0.0]),
             dimensions: Dimensions::Planar,
+            turn_max_rad: 0.0,
             times_s: config.waypoint_times_s,
             stretch_max: 1.0,
         };

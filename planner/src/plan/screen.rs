@@ -212,6 +212,7 @@ mod tests {
         let space = WaypointSpace {
             start: START_POSE,
             dimensions: Dimensions::Full,
+            turn_max_rad: 0.0,
             times_s: [0.45, 0.80, 1.15],
             stretch_max,
         };

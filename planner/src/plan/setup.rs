@@ -29,6 +29,16 @@ pub(super) struct Setup<'a> {
     pub(super) ropes: Vec<RopeParams>,
 }
 
+/// Most by which a throw of a rope that curls is turned away from the target's bearing
+/// (rad): what the tip of such a rope hangs aside, as seen from the base axis.
+const TURN_MAX_RAD: f64 = 0.3;
+
+/// Whether a rope at rest leaves the vertical plane of the throw.
+fn curls(rope: &RopeParams) -> bool {
+    let mut curvature = rope.beyond().rest_curvature_per_m.into_iter();
+    curvature.any(|c| c.abs() > 0.0)
+}
+
 /// What was spent.
 #[derive(Default)]
 pub(super) struct Count {
@@ -61,6 +71,11 @@ impl<'a> Setup<'a> {
         let space = WaypointSpace {
             start: start_pose_for(task.target_m()),
             dimensions: request.options.dimensions,
+            turn_max_rad: if curls(&request.rope) {
+                TURN_MAX_RAD
+            } else {
+                0.0
+            },
             times_s: config.waypoint_times_s,
             stretch_max: request.options.segment_stretch_max,
         };

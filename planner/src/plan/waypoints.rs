@@ -41,8 +41,8 @@ impl Dimensions {
 
 /// The space of throws that leave `start` and pass three waypoints. A point of
 /// it lists the moved joints (rad) of the first waypoint, then of the second and
-/// the third; where the times are free too, then the logarithm of how much each
-/// of the three segments is stretched.
+/// the third; where the whole throw may be turned, by how much (rad); where the times are
+/// free too, the logarithm of how much each of the three segments is stretched.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct WaypointSpace {
     /// Pose at rest from which the throw starts (rad).
@@ -51,6 +51,9 @@ pub(super) struct WaypointSpace {
     pub dimensions: Dimensions,
     /// Times of the waypoints after the start (s), increasing.
     pub times_s: [f64; WAYPOINTS],
+    /// Most by which joint 1 is turned all along, start included (rad); 0 where it keeps
+    /// the target's bearing. A rope that curls leaves the plane of the throw.
+    pub turn_max_rad: f64,
     /// Most by which a segment between these times is stretched or shrunk (1); 1
     /// where they are fixed, as in the paper.
     pub stretch_max: f64,
@@ -62,25 +65,31 @@ impl WaypointSpace {
         self.stretch_max > 1.0
     }
 
-    /// Number of search coordinates.
-    pub(super) fn count(&self) -> usize {
-        self.dimensions.count() + if self.is_timed() { WAYPOINTS } else { 0 }
+    /// Number of coordinates of poses, the first ones.
+    pub(super) fn pose_count(&self) -> usize {
+        self.dimensions.count() + usize::from(self.turn_max_rad > 0.0)
     }
 
-    /// One value per coordinate: `of_joint` (0-based) for the waypoints, `of_segment`
-    /// for the stretches.
-    fn filled<T: Copy>(&self, of_joint: impl Fn(usize) -> T, of_segment: T) -> Vec<T> {
+    /// Number of search coordinates.
+    pub(super) fn count(&self) -> usize {
+        self.pose_count() + if self.is_timed() { WAYPOINTS } else { 0 }
+    }
+
+    /// One value per coordinate: `of_joint` (0-based) for the waypoints, `of_turn` for the
+    /// turn, `of_segment` for the stretches.
+    fn filled<T: Copy>(&self, of_joint: impl Fn(usize) -> T, of_turn: T, of_segment: T) -> Vec<T> {
         let joints = self.dimensions.joints();
         let mut out: Vec<T> = (0..WAYPOINTS)
             .flat_map(|_| joints.iter().map(|&j| of_joint(j)))
             .collect();
+        out.resize(self.pose_count(), of_turn);
         out.resize(self.count(), of_segment);
         out
     }
 
     /// The point that stays in the start pose.
     pub(super) fn resting(&self) -> Vec<f64> {
-        self.filled(|j| self.start[j], 0.0)
+        self.filled(|j| self.start[j], 0.0, 0.0)
     }
 
     /// Ranges of the coordinates as (lower, upper): those of the joints (rad), and of
@@ -88,13 +97,17 @@ impl WaypointSpace {
     pub(super) fn bounds(&self, limits: &Limits) -> (Vec<f64>, Vec<f64>) {
         let most = self.stretch_max.ln();
         let of_joint = |j: usize| (limits.position_min_rad[j], limits.position_max_rad[j]);
-        self.filled(of_joint, (-most, most)).into_iter().unzip()
+        let turn = (-self.turn_max_rad, self.turn_max_rad);
+        self.filled(of_joint, turn, (-most, most))
+            .into_iter()
+            .unzip()
     }
 
     /// Deviations of a first generation from those of the joints (rad).
     pub(super) fn std_dev(&self, of_joints_rad: &JointVector) -> Vec<f64> {
         // The bounds are three deviations away.
-        self.filled(|j| of_joints_rad[j], self.stretch_max.ln() / 3.0)
+        let (turn, stretch) = (self.turn_max_rad / 3.0, self.stretch_max.ln() / 3.0);
+        self.filled(|j| of_joints_rad[j], turn, stretch)
     }
 
     /// Times of all knots of the spline of a point, start included (s).
@@ -102,7 +115,7 @@ impl WaypointSpace {
         let mut out = [0.0; WAYPOINTS + 1];
         out[1..].copy_from_slice(&self.times_s);
         if self.is_timed() {
-            let (at, fixed) = (self.dimensions.count(), out);
+            let (at, fixed) = (self.pose_count(), out);
             for i in 0..WAYPOINTS {
                 let stretch = x.get(at + i).map_or(1.0, |log| libm::exp(*log));
                 out[i + 1] = out[i] + stretch * (fixed[i + 1] - fixed[i]);
@@ -114,11 +127,19 @@ impl WaypointSpace {
     /// Poses at all knots of the spline, start included (rad). Missing
     /// coordinates stay at the start pose.
     pub(super) fn knots(&self, x: &[f64]) -> [JointVector; WAYPOINTS + 1] {
-        let joints = self.dimensions.joints();
+        let (joints, poses) = (self.dimensions.joints(), self.dimensions.count());
         let mut out = [self.start; WAYPOINTS + 1];
-        for (knot, part) in out[1..].iter_mut().zip(x.chunks(joints.len())) {
+        for (knot, part) in out[1..]
+            .iter_mut()
+            .zip(x[..poses.min(x.len())].chunks(joints.len()))
+        {
             for (&j, value) in joints.iter().zip(part) {
                 knot[j] = *value;
+            }
+        }
+        if let Some(turn) = x.get(poses).filter(|_| self.turn_max_rad > 0.0) {
+            for knot in &mut out {
+                knot[0] += turn;
             }
         }
         out
@@ -143,6 +164,7 @@ mod tests {
         [Dimensions::Planar, Dimensions::Full].map(|dimensions| WaypointSpace {
             start: START_POSE,
             dimensions,
+            turn_max_rad: 0.0,
             times_s: [0.4, 0.8, 1.1],
             stretch_max,
         })

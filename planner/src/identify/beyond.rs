@@ -1,0 +1,48 @@
+//! What real ropes have beyond the nine parameters, fitted where the film shows it.
+//!
+//! A rest curvature, dry friction in bending and a swing at the film's begin are errors of a
+//! plain fit's model, which takes them up in length, stiffness and the camera's place. Their
+//! fit starts from the plain one, once for each of several kinds of friction, because how
+//! it saturates has local minima. It counts only where it explains the film so much better
+//! that chance cannot: a rope that has none of it keeps its plain fit.
+
+use super::budget::Budget;
+use super::coordinates::{Coordinates, FRICTION, Point, SLIP};
+use super::error::IdentifyError;
+use super::film::{Fidelity, Film};
+use super::refine::{Refined, refine};
+
+/// Friction (1/m) and logarithm of its slip (1/m) at which the fit starts.
+const STARTS: [(f64, f64); 3] = [(0.02, -0.7), (0.3, -1.2), (0.5, 0.3)];
+/// Least gain in cost (half of a sum of squared deviations). By chance the eight numbers
+/// gain four, more where the film's noise is not as estimated.
+const GAIN_MIN: f64 = 25.0;
+
+/// The fit with everything that a real rope may have, where the film shows it, else the
+/// plain one.
+pub(super) fn beyond(
+    film: &Film<'_>,
+    coordinates: &Coordinates,
+    plain: Refined,
+    budget: &mut Budget<'_>,
+) -> Result<Refined, IdentifyError> {
+    let coordinates = coordinates.beyond();
+    let start = |(friction, slip): (f64, f64)| {
+        let mut x: Point = plain.x;
+        (x[FRICTION], x[SLIP]) = (friction, slip);
+        x
+    };
+    let noise_px = plain.at.distance_px / 2.0_f64.sqrt();
+    let starts = STARTS.map(start);
+    let found = refine(film, &coordinates, &starts, noise_px, budget)?;
+    let cost = |fit: &Refined, x: &Point| {
+        let normal = fit.at.normal(film, Fidelity::Fine, &found.noise);
+        normal.total_cost(&coordinates, x)
+    };
+    // A plain fit has no friction whose slip could be likely or not.
+    let mut without = plain.x;
+    without[SLIP] = coordinates.prior_mean[SLIP];
+    let gain = cost(&plain, &without) - cost(&found, &found.x);
+    tracing::debug!(gain, x = ?found.x.as_slice(), "fit beyond the nine parameters");
+    Ok(if gain > GAIN_MIN { found } else { plain })
+}
