@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_output::seed;
 use planner::identify::Method;
+use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
@@ -61,6 +62,48 @@ pub enum ResultCommand {
     ParameterImportance(ResultArgs),
     /// Sensitivity of the network's answer to each keypoint, parameter by parameter.
     SensitivityMaps(ResultArgs),
+    /// Miss of strikes with ropes that MuJoCo simulates, with what the equations leave out.
+    ///
+    /// Needs a Python with MuJoCo, named by WAG_MUJOCO_PYTHON. Tune with odd seeds only: even
+    /// ones are reserved for judging.
+    OtherReality(OtherRealityArgs),
+}
+
+/// Arguments of `experiments other-reality`.
+#[derive(Debug, Args)]
+pub struct OtherRealityArgs {
+    #[command(flatten)]
+    pub result: ResultArgs,
+    /// What differs from the model; again for more. Default: each in turn, then all at once.
+    #[arg(long = "channel", value_name = "NAME", value_enum)]
+    pub channels: Vec<ChannelName>,
+    /// Links in MuJoCo for each of the rope's own; bending stiffness and damping stay.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=4))]
+    pub refinement: u32,
+}
+
+/// How reality differs from the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ChannelName {
+    /// Not at all, but for the finer links.
+    None,
+    /// Hysteretic friction in bending, of 2 to 20 % of the elastic moment at 1 to 3 rad/m.
+    Friction,
+    /// The unloaded rope is curved, by 0.2 to 0.6 rad/m.
+    Curvature,
+    /// The rope swings by 1 to 4 degrees when the wiggle begins.
+    Sway,
+    /// The air drags, quadratically in the speed.
+    Drag,
+    /// The rope leaves the pole 1 degree off its axis.
+    ClampTilt,
+    /// The camera stands 5 mm and looks 0.5 degree off its calibration.
+    Camera,
+    /// Joint zeros are 0.2 degree off, and joints lag behind by 10 to 22 ms.
+    Joints,
+    /// All of these.
+    All,
 }
 
 /// Arguments of a result.
@@ -68,7 +111,8 @@ pub enum ResultCommand {
 pub struct ResultArgs {
     /// Simulated ropes; default: 1000, for sim-pipeline 100, for wiggle-ablation 24 with
     /// each wiggle, for lob-drape its own 24, for robust 200,
-    /// for parameter-importance 30, for sensitivity-maps 8
+    /// for parameter-importance 30, for sensitivity-maps 8, for other-reality 20 with each
+    /// channel
     /// (motion-fidelity has its own).
     #[arg(long)]
     pub ropes: Option<u64>,

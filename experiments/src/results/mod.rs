@@ -10,6 +10,7 @@ mod fidelity;
 mod importance;
 mod lob_drape;
 mod ood;
+mod other_reality;
 mod picture;
 mod pipeline;
 mod robust;
@@ -31,6 +32,7 @@ type Study = fn(Experiment<'_>) -> Outcome<Option<Value>>;
 /// Makes a result. The value is what `--json` prints.
 pub fn run(command: &ResultCommand) -> Outcome<Option<Value>> {
     let (name, args, study): (_, &ResultArgs, Study) = match command {
+        ResultCommand::OtherReality(args) => return other_reality::run(args),
         ResultCommand::Sysid(args) => ("sysid", args, sysid::run),
         ResultCommand::MotionFidelity(args) => ("motion-fidelity", args, fidelity::run),
         ResultCommand::SysidOod(args) => ("sysid-ood", args, ood::run),

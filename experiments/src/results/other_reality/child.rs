@@ -1,0 +1,326 @@
+//! A rope in MuJoCo: what `other_reality/rope.py` is asked, in a child process, and what it
+//! answers.
+
+use anyhow::{Context, anyhow, bail, ensure};
+use arm_model::kinematics::FrameMotion;
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use rope_sim::{AirDrag, FrameTimes};
+use serde::{Deserialize, Serialize};
+use shared_types::RopeParams;
+use std::ffi::OsString;
+use std::process::{Command, Stdio};
+
+/// Names the Python that has MuJoCo.
+pub(super) const PYTHON: &str = "WAG_MUJOCO_PYTHON";
+const SCRIPT: &str = include_str!("../../../other_reality/rope.py");
+/// Step of the simulation, and time between two poses of the attach frame (s).
+const STEP_S: f64 = 5e-4;
+
+/// Dahl friction in bending.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Friction {
+    /// Moment that it does not exceed (N m).
+    pub moment_nm: f64,
+    /// Curvature over which it builds up (rad/m).
+    pub slip_curvature_rad_per_m: f64,
+}
+
+/// A rope that swings at the start, about the world's x and y.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Sway {
+    pub angle_rad: [f64; 2],
+    pub rate_rad_s: [f64; 2],
+}
+
+/// Drag of still air, named as the script has it.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Drag {
+    air_density_kg_m3: f64,
+    normal: f64,
+    tangential: f64,
+    lead: f64,
+}
+
+impl From<AirDrag> for Drag {
+    fn from(drag: AirDrag) -> Self {
+        Self {
+            air_density_kg_m3: drag.air_density_kg_m3,
+            normal: drag.normal_coefficient,
+            tangential: drag.tangential_coefficient,
+            lead: drag.lead_coefficient,
+        }
+    }
+}
+
+/// What is true of a rope beyond its nine parameters.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Channels {
+    pub friction: Option<Friction>,
+    /// About two axes across the rope (rad/m).
+    pub rest_curvature_per_m: [f64; 2],
+    pub air_drag: Option<AirDrag>,
+    /// About two axes across the rope (rad).
+    pub clamp_tilt_rad: [f64; 2],
+    pub sway: Option<Sway>,
+}
+
+/// A rope in MuJoCo.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OtherRope {
+    pub params: RopeParams,
+    /// Links for each of its links.
+    pub refinement: u32,
+    pub channels: Channels,
+}
+
+/// A Python that has MuJoCo.
+#[derive(Debug, Clone)]
+pub(super) struct Mujoco(OsString);
+
+#[derive(Serialize)]
+struct Request<'a> {
+    rope: &'a RopeParams,
+    refinement: u32,
+    channels: serde_json::Value,
+    seed: u64,
+    pose_period_s: f64,
+    poses: Vec<[f64; 7]>,
+    times_s: Vec<f64>,
+    nodes: usize,
+}
+
+#[derive(Deserialize)]
+struct Answer {
+    nodes_m: Vec<f64>,
+}
+
+impl Channels {
+    fn request(&self) -> serde_json::Value {
+        let mut channels = serde_json::json!({
+            "curvature_rad_per_m": self.rest_curvature_per_m,
+            "clamp_tilt_rad": self.clamp_tilt_rad,
+        });
+        if let Some(friction) = self.friction {
+            channels["friction"] = serde_json::json!(friction);
+        }
+        if let Some(drag) = self.air_drag {
+            channels["drag"] = serde_json::json!(Drag::from(drag));
+        }
+        if let Some(sway) = self.sway {
+            channels["sway"] = serde_json::json!(sway);
+        }
+        channels
+    }
+}
+
+impl Mujoco {
+    /// The Python that the environment names.
+    pub fn from_environment() -> anyhow::Result<Self> {
+        std::env::var_os(PYTHON).map(Self).with_context(|| {
+            format!("{PYTHON} does not name a Python with MuJoCo: make one with `python3 -m venv venv && venv/bin/pip install mujoco numpy`, then set {PYTHON}=venv/bin/python")
+        })
+    }
+
+    /// Positions of `nodes` points of a rope, uniform in arc length from clamp to tip, whose
+    /// attach frame moves as told; time by time. The rope hung at rest before, in one of the
+    /// shapes that friction holds; which one, `seed` says.
+    pub fn simulate(
+        &self,
+        rope: &OtherRope,
+        motion: impl Fn(f64) -> FrameMotion,
+        seed: u64,
+        times: &FrameTimes,
+        nodes: usize,
+    ) -> anyhow::Result<Vec<Vector3<f64>>> {
+        let times_s: Vec<f64> = (0..times.count).map(|i| times.time_s(i)).collect();
+        let last_s = times_s.last().context("no time is asked for")?;
+        let steps = (last_s / STEP_S).ceil() as usize;
+        let request = Request {
+            rope: &rope.params,
+            refinement: rope.refinement,
+            channels: rope.channels.request(),
+            seed,
+            pose_period_s: STEP_S,
+            poses: (0..=steps)
+                .map(|i| pose(&motion(i as f64 * STEP_S)))
+                .collect(),
+            nodes,
+            times_s,
+        };
+        let answer: Answer = serde_json::from_slice(&self.ask(&serde_json::to_vec(&request)?)?)
+            .context("answer of MuJoCo's rope")?;
+        ensure!(
+            answer.nodes_m.len() == 3 * nodes * times.count,
+            "MuJoCo's rope answered with {} numbers, not {}",
+            answer.nodes_m.len(),
+            3 * nodes * times.count
+        );
+        let points = answer.nodes_m.chunks_exact(3);
+        Ok(points.map(Vector3::from_column_slice).collect())
+    }
+
+    fn ask(&self, request: &[u8]) -> anyhow::Result<Vec<u8>> {
+        use std::io::Write;
+        let mut child = Command::new(&self.0)
+            .args(["-c", SCRIPT])
+            // Its matrices are small; threads would only get in each other's way.
+            .env("OPENBLAS_NUM_THREADS", "1")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .with_context(|| format!("{PYTHON} `{}`", self.0.display()))?;
+        // It reads everything before it writes. One that ended early says why itself.
+        let written = match child.stdin.take() {
+            Some(mut stdin) => stdin.write_all(request),
+            None => bail!("no standard input for MuJoCo's rope"),
+        };
+        let output = child.wait_with_output()?;
+        if output.status.success() {
+            written?;
+            return Ok(output.stdout);
+        }
+        let said = String::from_utf8_lossy(&output.stderr);
+        let last = said.lines().last().unwrap_or("it said nothing");
+        Err(anyhow!(
+            "the rope in MuJoCo failed ({PYTHON} `{}`; it needs `pip install mujoco numpy`): {last}",
+            self.0.display()
+        ))
+    }
+}
+
+/// Origin, then attitude as a quaternion, scalar first.
+fn pose(frame: &FrameMotion) -> [f64; 7] {
+    let attitude = Rotation3::from_matrix_unchecked(frame.r);
+    let q = UnitQuaternion::from_rotation_matrix(&attitude);
+    let p = frame.p_m;
+    [p.x, p.y, p.z, q.w, q.i, q.j, q.k]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use planner::ropes::trial_rope;
+    use planner::wiggle::{WiggleConfig, wiggling_arm};
+    use rope_sim::{AttachMotion, Candidate, Precision, RopeExtras, SimOptions, roll_out};
+
+    /// The Python, or nothing where there is none: said aloud, and a failure in CI.
+    fn mujoco() -> Option<Mujoco> {
+        match Mujoco::from_environment() {
+            Ok(mujoco) => Some(mujoco),
+            Err(missing) if std::env::var_os("CI").is_some() => panic!("{missing}"),
+            Err(missing) => {
+                eprintln!("skipped: {missing}");
+                None
+            }
+        }
+    }
+
+    fn plain(params: RopeParams, refinement: u32) -> OtherRope {
+        OtherRope {
+            params,
+            refinement,
+            channels: Channels::default(),
+        }
+    }
+
+    /// MuJoCo has the equations of motion, and none of ours; drag is the script's own.
+    #[test]
+    fn what_both_know_is_the_same_rope() {
+        let Some(mujoco) = mujoco() else { return };
+        let times = FrameTimes {
+            first_s: 0.0,
+            period_s: 0.02,
+            count: 336,
+        };
+        let arm = wiggling_arm(&WiggleConfig::default()).unwrap();
+        let options = SimOptions {
+            frames: times,
+            ..SimOptions::new(2.5e-4, Precision::F64, 6.7)
+        };
+        let extras = RopeExtras {
+            air_drag: Some(AirDrag {
+                air_density_kg_m3: 1.2,
+                normal_coefficient: 1.1,
+                tangential_coefficient: 0.02,
+                lead_coefficient: 0.5,
+            }),
+            rest_curvature_per_m: [0.3, -0.4, 0.0],
+            mass_slope: 0.0,
+        };
+        for (index, extras) in [(0, RopeExtras::NONE), (1, RopeExtras::NONE), (0, extras)] {
+            let rope = trial_rope(1, index);
+            let [x, y, _] = extras.rest_curvature_per_m;
+            let other = OtherRope {
+                channels: Channels {
+                    air_drag: extras.air_drag,
+                    rest_curvature_per_m: [x, y],
+                    ..Channels::default()
+                },
+                ..plain(rope, 1)
+            };
+            let candidate = Candidate::new(&rope, &arm).with_extras(extras);
+            let ours = roll_out(&[candidate], &options).unwrap();
+            let motion = |t_s| arm.at(t_s);
+            let theirs = mujoco.simulate(&other, motion, 1, &times, 2).unwrap();
+            let tip = rope.links as usize;
+            for (frame, nodes) in theirs.chunks_exact(2).enumerate() {
+                let apart_m = (ours[0].nodes.position(frame, tip) - nodes[1]).norm();
+                assert!(apart_m < 1e-3, "rope {index}, frame {frame}: {apart_m} m");
+            }
+        }
+    }
+
+    /// A swinging rope with friction comes to rest, sooner and elsewhere.
+    #[test]
+    fn friction_takes_the_swing_away_and_holds_the_rope_off_its_equilibrium() {
+        let Some(mujoco) = mujoco() else { return };
+        let times = FrameTimes {
+            first_s: 0.0,
+            period_s: 0.02,
+            count: 400,
+        };
+        let rope = RopeParams {
+            joint_damping_nms_per_rad: 5e-4,
+            ..trial_rope(1, 0)
+        };
+        let stiffness_nm2 = rope.joint_stiffness_nm_per_rad * rope.link_length_m();
+        let tips = |friction: Option<Friction>, seed: u64| -> Vec<Vector3<f64>> {
+            let sway = Sway {
+                angle_rad: [0.1, 0.0],
+                rate_rad_s: [0.0, 0.0],
+            };
+            let swinging = OtherRope {
+                channels: Channels {
+                    friction,
+                    sway: Some(sway),
+                    ..Channels::default()
+                },
+                ..plain(rope, 1)
+            };
+            let nodes = mujoco
+                .simulate(&swinging, |_| FrameMotion::world(), seed, &times, 2)
+                .unwrap();
+            nodes.chunks_exact(2).map(|nodes| nodes[1]).collect()
+        };
+        // Extent of the swing in the last fifth, and the middle of it.
+        let end = |tips: &[Vector3<f64>]| {
+            let y: Vec<f64> = tips[320..].iter().map(|tip| tip.y).collect();
+            let (low, high) = y
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &y| {
+                    (a.min(y), b.max(y))
+                });
+            (high - low, f64::midpoint(low, high))
+        };
+        let friction = Friction {
+            moment_nm: 0.1 * stiffness_nm2,
+            slip_curvature_rad_per_m: 0.1,
+        };
+        let (free_m, _) = end(&tips(None, 1));
+        let (held_m, at_m) = end(&tips(Some(friction), 1));
+        let (_, elsewhere_m) = end(&tips(Some(friction), 2));
+        assert!(held_m < free_m / 3.0, "{held_m} of {free_m} m");
+        assert!((at_m - elsewhere_m).abs() > 1e-4, "{at_m} {elsewhere_m} m");
+    }
+}
