@@ -93,10 +93,8 @@ impl Case {
         let (curved, tilted, swung) = (direction(), direction(), direction());
         let camera = [direction(), direction(), direction()];
         let friction = Friction {
-            moment_nm: params.joint_stiffness_nm_per_rad
-                * params.link_length_m()
-                * uniform(1.0, 3.0)
-                * uniform(0.02_f64.ln(), 0.2_f64.ln()).exp(),
+            moment_nm: uniform(0.02_f64.ln(), 0.2_f64.ln()).exp()
+                * bending_moment_nm(&params, uniform(0.1, 0.3)),
             slip_curvature_rad_per_m: uniform(0.2, 1.5),
         };
         let curvature = curved * uniform(0.2, 0.6);
@@ -191,6 +189,15 @@ fn pendulum_rad_s(rope: &RopeParams) -> f64 {
     let moment = rope.lead_mass_kg + rope_kg / 2.0;
     let inertia = (rope.lead_mass_kg + rope_kg / 3.0) * rope.length_m;
     (9.81 * moment / inertia).sqrt()
+}
+
+/// Elastic moment at a clamp that is turned by `angle_rad` against the rope's weight (N m): that
+/// of a tensioned beam.
+fn bending_moment_nm(rope: &RopeParams, angle_rad: f64) -> f64 {
+    let rope_kg = rope.mass_per_length_kg_per_m * rope.length_m;
+    let weight_n = 9.81 * (rope.lead_mass_kg + rope_kg);
+    let stiffness_nm2 = rope.joint_stiffness_nm_per_rad * rope.link_length_m();
+    angle_rad * (stiffness_nm2 * weight_n).sqrt()
 }
 
 /// A film whose camera stands 5 mm and looks half a degree off.
