@@ -1,11 +1,12 @@
 //! What [`shared_types::RopeExtras`] do to a rope: drag of still air and mass that is uneven
-//! along it as loads, a rest curvature and dry friction in its joints.
+//! along it as loads, a rest curvature, dry friction and a first joint of its own.
 //!
 //! Along and across a link the drag is taken against the velocity at the end of the step with
 //! the speed of the prediction, so it only ever takes energy away. The elimination knows links
 //! of one mass: what a link has more or less than that rides at its centre, as a load.
 
 use crate::algebra::{Sym3, Vec3};
+use crate::clamp::ClampLanes;
 use crate::contact::Node;
 use crate::friction::FrictionLanes;
 use crate::kernel::{centripetal, up};
@@ -22,6 +23,7 @@ pub(crate) struct ExtraLanes<V> {
     drag: Option<DragLanes<V>>,
     masses: Option<MassLanes<V>>,
     friction: Option<FrictionLanes<V>>,
+    clamp: Option<ClampLanes<V>>,
     is_curved: bool,
 }
 
@@ -34,6 +36,7 @@ impl<V: Lanes> ExtraLanes<V> {
         let mut drag = DragLanes::none();
         let mut masses = MassLanes::uniform(links);
         let mut friction = FrictionLanes::none(links);
+        let mut clamp = ClampLanes::none();
         for lane in 0..V::COUNT {
             let Some(rope) = ropes.get(lane).or_else(|| ropes.last()) else {
                 continue;
@@ -41,6 +44,7 @@ impl<V: Lanes> ExtraLanes<V> {
             drag.set(lane, rope);
             masses.set(lane, rope);
             friction.set(lane, rope);
+            clamp.set(lane, rope);
             let curvature = Vector3::from(rope.beyond().rest_curvature_per_m);
             let q = UnitQuaternion::from_scaled_axis(curvature * rope.link_length_m());
             loads.rest_turn.set(lane, [q.w, q.i, q.j, q.k]);
@@ -55,6 +59,9 @@ impl<V: Lanes> ExtraLanes<V> {
             drag: extras().any(|e| e.air_drag.is_some()).then_some(drag),
             masses: extras().any(|e| e.mass_slope.abs() > 0.0).then_some(masses),
             friction: has_friction.then_some(friction),
+            clamp: extras()
+                .any(|e| (e.clamp_stiffness - 1.0).abs() > 0.0)
+                .then_some(clamp),
             is_curved: extras().any(|e| e.rest_curvature_per_m.iter().any(bends)),
         }
     }
@@ -62,7 +69,11 @@ impl<V: Lanes> ExtraLanes<V> {
     /// Whether any rope has any.
     #[inline(always)]
     pub(crate) fn is_any(&self) -> bool {
-        self.is_curved || self.drag.is_some() || self.masses.is_some() || self.friction.is_some()
+        self.is_curved
+            || self.drag.is_some()
+            || self.masses.is_some()
+            || self.friction.is_some()
+            || self.clamp.is_some()
     }
 
     /// Notes how the ropes move at the start.
@@ -97,6 +108,9 @@ impl<V: Lanes> ExtraLanes<V> {
             for (index, (link, node)) in links.iter().zip(nodes).enumerate() {
                 loads.add(index, &masses.on_link(index, link, node.span, scheme));
             }
+        }
+        if let Some(clamp) = &self.clamp {
+            clamp.load(loads, links, rope, attach);
         }
         if let Some(friction) = &self.friction {
             friction.moments(&mut loads.joint_moments, links, attach, scheme.h);

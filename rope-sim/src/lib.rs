@@ -22,6 +22,7 @@ mod algebra;
 mod arm_knots;
 mod base_path;
 mod batch;
+mod clamp;
 mod clock;
 mod contact;
 #[cfg(test)]

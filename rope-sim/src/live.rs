@@ -268,6 +268,7 @@ mod tests {
         let extras = RopeExtras {
             rest_curvature_per_m: [0.3, -0.5, 0.0],
             mass_slope: 0.2,
+            clamp_stiffness: 1.7,
             friction: Some(friction),
             ..RopeExtras::NONE
         };

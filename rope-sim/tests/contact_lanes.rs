@@ -39,6 +39,7 @@ fn extras(index: usize) -> RopeExtras {
         air_drag: (index % 3 == 1).then_some(AIR),
         rest_curvature_per_m: [0.0, if index % 4 == 2 { 1.5 } else { 0.0 }, 0.0],
         mass_slope: if index % 5 == 3 { 0.4 } else { 0.0 },
+        clamp_stiffness: if index % 7 == 5 { 1.6 } else { 1.0 },
         friction: (index % 6 == 4).then_some(BendingFriction {
             moment_max_nm: 0.002,
             slip_curvature_per_m: 0.5,

@@ -1,5 +1,6 @@
 //! What a rope may have beyond the paper's nine parameters: air drag, a rest curvature,
-//! mass that is uneven along it and dry friction in bending. Off by default.
+//! mass that is uneven along it, dry friction in bending and a clamp of its own. Off by
+//! default.
 
 use crate::rope::{RopeError, RopeParams};
 use serde::{Deserialize, Serialize};
@@ -38,7 +39,7 @@ pub struct BendingFriction {
 }
 
 /// Physics of a rope beyond its nine parameters. TOML form: table `extras` of `rope.toml`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RopeExtras {
     /// Curvature of the unloaded rope (rad/m), a rotation vector per length in the
@@ -50,6 +51,10 @@ pub struct RopeExtras {
     /// end, from -0.95 to 0.95. Zero is an even rope. Sizes and the links' inertia about
     /// their centres stay.
     pub mass_slope: f64,
+    /// Stiffness and damping of the first joint, as a multiple of the others' (1). A rope
+    /// clamped rigidly bends along the half link on the clamp's far side only: about 2 in
+    /// the limit of a continuous rope, less in a clamp that gives.
+    pub clamp_stiffness: f64,
     /// Drag of still air; `None` is vacuum, as in the paper.
     pub air_drag: Option<AirDrag>,
     /// Dry friction in bending; `None` is a rope without.
@@ -62,6 +67,7 @@ impl RopeExtras {
         air_drag: None,
         rest_curvature_per_m: [0.0; 3],
         mass_slope: 0.0,
+        clamp_stiffness: 1.0,
         friction: None,
     };
 
@@ -91,6 +97,7 @@ impl RopeExtras {
             ("extras.rest_curvature_per_m", y, -1e3, 1e3),
             ("extras.rest_curvature_per_m", z, -1e3, 1e3),
             ("extras.mass_slope", self.mass_slope, -0.95, 0.95),
+            ("extras.clamp_stiffness", self.clamp_stiffness, 0.01, 100.0),
             ("extras.air_drag.air_density_kg_m3", drag[0], 0.0, 1e4),
             ("extras.air_drag.normal_coefficient", drag[1], 0.0, 1e4),
             ("extras.air_drag.tangential_coefficient", drag[2], 0.0, 1e4),
@@ -105,6 +112,12 @@ impl RopeExtras {
         ]
         .into_iter()
         .try_for_each(|(key, value, min, max)| RopeError::unless_within(key, value, min, max))
+    }
+}
+
+impl Default for RopeExtras {
+    fn default() -> Self {
+        Self::NONE
     }
 }
 

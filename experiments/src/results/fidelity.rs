@@ -101,7 +101,7 @@ impl FidelityConfig {
                 air_drag: Some(self.air),
                 rest_curvature_per_m: [0.0, kind.curvature_per_m, 0.0],
                 mass_slope: kind.mass_slope,
-                friction: None,
+                ..RopeExtras::NONE
             };
             Ok(RealRope {
                 name: format!("{}, {:.0} g", kind.name, 1e3 * lead_mass_kg),

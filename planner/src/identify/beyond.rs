@@ -7,7 +7,9 @@
 //! that chance cannot: a rope that has none of it keeps its plain fit.
 
 use super::budget::Budget;
-use super::coordinates::{Coordinates, FRICTION, Point, SLIP};
+use super::coordinates::{
+    CLAMP, Coordinates, FRICTION, LINKS, Point, SLIP, link_range, nearest_links,
+};
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
 use super::refine::{Refined, refine};
@@ -30,6 +32,8 @@ pub(super) fn beyond(
     let start = |(friction, slip): (f64, f64)| {
         let mut x: Point = plain.x;
         (x[FRICTION], x[SLIP]) = (friction, slip);
+        x[CLAMP] = coordinates.prior_mean[CLAMP];
+        x[LINKS] = f64::from(nearest_links(&x));
         x
     };
     let noise_px = plain.at.distance_px / 2.0_f64.sqrt();
@@ -39,10 +43,22 @@ pub(super) fn beyond(
         let normal = fit.at.normal(film, Fidelity::Fine, &found.noise);
         normal.total_cost(&coordinates, x)
     };
-    // A plain fit has no friction whose slip could be likely or not.
+    // A plain fit says nothing about a slip or a clamp that could be likely or not.
     let mut without = plain.x;
-    without[SLIP] = coordinates.prior_mean[SLIP];
-    let gain = cost(&plain, &without) - cost(&found, &found.x);
+    for i in [SLIP, CLAMP] {
+        without[i] = coordinates.prior_mean[i];
+    }
+    let gain = cost(&plain, &without) + counts_out_of_range(&plain)
+        - cost(&found, &found.x)
+        - counts_out_of_range(&found);
     tracing::debug!(gain, x = ?found.x.as_slice(), "fit beyond the nine parameters");
     Ok(if gain > GAIN_MIN { found } else { plain })
+}
+
+/// What it costs a fit that its rope has a link count of the ranges: a continuous rope asks
+/// for more links, which the clamp's stiffness stands for.
+fn counts_out_of_range(fit: &Refined) -> f64 {
+    let (low, high) = link_range();
+    let inside = fit.x[LINKS].clamp(f64::from(low), f64::from(high));
+    0.5 * (fit.x[LINKS] - inside).powi(2) / fit.covariance[(LINKS, LINKS)].max(1e-9)
 }

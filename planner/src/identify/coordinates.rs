@@ -18,7 +18,7 @@ use shared_types::rope::RANGES;
 use shared_types::{BendingFriction, RopeExtras, RopeParams};
 
 /// Number of coordinates.
-pub(super) const FREE: usize = 22;
+pub(super) const FREE: usize = 23;
 /// Number of those that a plain fit moves, the first ones.
 pub(super) const PLAIN: usize = 14;
 
@@ -47,13 +47,15 @@ pub(super) const CURVATURE: usize = 14;
 pub(super) const FRICTION: usize = 16;
 /// Logarithm of the change of curvature over which the friction comes up (1/m).
 pub(super) const SLIP: usize = 17;
+/// Logarithm of the first joint's stiffness and damping over the others'.
+pub(super) const CLAMP: usize = 18;
 /// First of the two angles (rad) of the swing at the film's begin, their rates (rad/s)
 /// behind them.
-pub(super) const SWAY: usize = 18;
+pub(super) const SWAY: usize = 19;
 
 /// Coordinates that need a simulation of their own, the link count left out: those of a
 /// plain fit first.
-pub(super) const SIMULATED: [usize; 14] = [
+pub(super) const SIMULATED: [usize; 15] = [
     LENGTH,
     STIFFNESS,
     DAMPING,
@@ -64,6 +66,7 @@ pub(super) const SIMULATED: [usize; 14] = [
     CURVATURE + 1,
     FRICTION,
     SLIP,
+    CLAMP,
     SWAY,
     SWAY + 1,
     SWAY + 2,
@@ -139,6 +142,7 @@ pub(super) fn extras_of(x: &Point, bending_stiffness_nm2: f64) -> Option<RopeExt
     let is_plain = (PLAIN..FREE).all(|i| x[i] == 0.0);
     (!is_plain).then(|| RopeExtras {
         rest_curvature_per_m: [x[CURVATURE], x[CURVATURE + 1], 0.0],
+        clamp_stiffness: x[CLAMP].exp(),
         friction: Some(BendingFriction {
             moment_max_nm: x[FRICTION] * bending_stiffness_nm2,
             slip_curvature_per_m: x[SLIP].exp(),
@@ -269,6 +273,8 @@ impl Coordinates {
             (FRICTION, [0.0, 0.0, 10.0, 0.5]),
             // From 0.03 to 10 rad/m, about 0.5.
             (SLIP, [-3.5, -0.7, 2.3, 0.8]),
+            // Between a joint like the others and a rigid clamp of a continuous rope.
+            (CLAMP, [-1.5, 0.35, 1.5, 0.35]),
             (SWAY, [-0.3, 0.0, 0.3, 0.04]),
             (SWAY + 1, [-0.3, 0.0, 0.3, 0.04]),
             (SWAY + 2, [-1.5, 0.0, 1.5, 0.2]),

@@ -17,10 +17,10 @@ use shared_types::RopeParams;
 
 /// Steps of the one-sided differences in double precision: length (m), three
 /// logarithms, lead radius (m), inertia radius (1); two curvatures and friction (1/m), the
-/// logarithm of its slip, two angles (rad) and their rates (rad/s). Friction is not smooth:
+/// logarithms of its slip and of the clamp, two angles (rad) and their rates (rad/s). Friction is not smooth:
 /// its steps are longer than rounding asks for.
 const FINE_STEPS: [f64; SIMULATED.len()] = [
-    2e-5, 5e-4, 5e-4, 5e-4, 1e-4, 5e-3, 1e-3, 1e-3, 4e-3, 2e-2, 1e-4, 1e-4, 5e-4, 5e-4,
+    2e-5, 5e-4, 5e-4, 5e-4, 1e-4, 5e-3, 1e-3, 1e-3, 4e-3, 2e-2, 2e-3, 1e-4, 1e-4, 5e-4, 5e-4,
 ];
 /// In single precision, in which only plain fits are made.
 const COARSE_STEPS: [f64; SIMULATED_PLAIN] = [2e-3, 4e-2, 4e-2, 4e-2, 2e-3, 0.0];

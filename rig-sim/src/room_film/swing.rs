@@ -68,6 +68,6 @@ pub(super) fn extras(rng: &mut impl Rng) -> RopeExtras {
         air_drag: Some(air_drag),
         rest_curvature_per_m: [bend(), bend(), 0.0],
         mass_slope: rng.random_range(-0.12..0.12),
-        friction: None,
+        ..RopeExtras::NONE
     }
 }

@@ -20,6 +20,8 @@ const MAX_TURN_RAD: f64 = 0.5;
 
 struct Chain {
     stiffness_nm: f64,
+    /// Of the first joint beyond the others' (N m/rad).
+    clamp_nm: f64,
     weight_nm: Vec<f64>,
     attach: UnitQuaternion<f64>,
     rest_turn: UnitQuaternion<f64>,
@@ -29,13 +31,15 @@ struct Chain {
 pub(super) fn hanging(
     rope: &RopeParams,
     weight_nm: Vec<f64>,
-    curvature_per_m: Vector3<f64>,
     r_attach: &Matrix3<f64>,
     start: &[[f64; 4]],
 ) -> Vec<[f64; 4]> {
     let rotation = Rotation3::from_matrix_unchecked(*r_attach);
+    let extras = rope.beyond();
+    let curvature_per_m = Vector3::from(extras.rest_curvature_per_m);
     let chain = Chain {
         stiffness_nm: rope.joint_stiffness_nm_per_rad,
+        clamp_nm: rope.joint_stiffness_nm_per_rad * (extras.clamp_stiffness - 1.0),
         weight_nm,
         attach: UnitQuaternion::from_rotation_matrix(&rotation),
         rest_turn: UnitQuaternion::from_scaled_axis(curvature_per_m * rope.link_length_m()),
@@ -96,10 +100,12 @@ impl Chain {
     }
 
     fn energy(&self, links: &[UnitQuaternion<f64>]) -> f64 {
-        let springs: f64 = self.strains(links).iter().map(Vector3::norm_squared).sum();
+        let strains = self.strains(links);
+        let springs: f64 = strains.iter().map(Vector3::norm_squared).sum();
+        let clamp = strains.first().map_or(0.0, Vector3::norm_squared);
         let heights = links.iter().zip(&self.weight_nm);
         let height: f64 = heights.map(|(q, w)| w * down(q).z).sum();
-        0.5 * self.stiffness_nm * springs + height
+        0.5 * (self.stiffness_nm * springs + self.clamp_nm * clamp) + height
     }
 
     /// Torque that would have to hold every link (N m).
@@ -110,7 +116,8 @@ impl Chain {
             .map(|i| {
                 let beyond = strains.get(i + 1).copied().unwrap_or_default();
                 let gravity = down(&links[i]).cross(&Vector3::z()) * self.weight_nm[i];
-                (strains[i] - beyond) * self.stiffness_nm + gravity
+                let clamp = strains[i] * if i == 0 { self.clamp_nm } else { 0.0 };
+                (strains[i] - beyond) * self.stiffness_nm + clamp + gravity
             })
             .collect()
     }
@@ -127,7 +134,8 @@ impl Chain {
         let mut turns: Vec<Vector3<f64>> = Vec::with_capacity(count);
         for i in 0..count {
             let d = down(&links[i]);
-            let springs = if i + 1 < count { 2.0 * k } else { k };
+            let clamp = if i == 0 { self.clamp_nm } else { 0.0 };
+            let springs = clamp + if i + 1 < count { 2.0 * k } else { k };
             let swing = Matrix3::identity() - d * d.transpose();
             let mut block = Matrix3::identity() * (springs + 1e-12)
                 + swing * (self.weight_nm[i] * (-d.z).max(0.0));

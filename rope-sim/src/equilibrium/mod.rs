@@ -4,8 +4,8 @@
 //! frame's -z axis. With `psi_i` the angle of link i from straight down, it
 //! minimises `sum k/2 (psi_i - psi_{i-1})² - g s W_i cos psi_i`, where `W_i` is the
 //! mass carried by link i (half of its own). Newton's method on the angles with a
-//! tridiagonal, positive matrix finds it in a few iterations. A rope with a rest
-//! curvature leaves the plane, see [`curved`].
+//! tridiagonal, positive matrix finds it in a few iterations. For a rope with a rest
+//! curvature, which leaves the plane, or a first joint of its own, see [`curved`].
 
 mod curved;
 
@@ -77,10 +77,11 @@ pub(crate) fn hanging_links(rope: &RopeParams, r_attach: &Matrix3<f64>) -> Vec<[
     let weight_nm = weights_nm(rope, &extras);
     let straight = hanging_straight(rope, &weight_nm, r_attach);
     let curvature = Vector3::from(extras.rest_curvature_per_m);
-    if curvature == Vector3::zeros() {
+    let clamped_alike = (extras.clamp_stiffness - 1.0).abs() <= 0.0;
+    if curvature == Vector3::zeros() && clamped_alike {
         straight
     } else {
-        curved::hanging(rope, weight_nm, curvature, r_attach, &straight)
+        curved::hanging(rope, weight_nm, r_attach, &straight)
     }
 }
 

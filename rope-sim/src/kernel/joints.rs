@@ -95,7 +95,7 @@ impl<V: Lanes> Joints<V> {
 /// Stiffness times joint angle over the sine of the half angle: a polynomial in
 /// `1 - |cos|` of the half angle; the sign picks the rotation of at most half a turn.
 #[inline(always)]
-fn spring<V: Lanes>(rope: &RopeLanes<V>, half_cos: V) -> V {
+pub(crate) fn spring<V: Lanes>(rope: &RopeLanes<V>, half_cos: V) -> V {
     let x = V::splat(1.0) - half_cos.abs();
     let mut f = V::splat(0.0);
     let mut first = true;

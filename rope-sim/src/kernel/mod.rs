@@ -22,6 +22,7 @@ mod joints;
 mod link;
 mod outboard;
 
+pub(crate) use joints::spring;
 pub(crate) use link::{Elimination, GRAVITY_M_S2, centripetal, up};
 
 use crate::algebra::Vec3;

@@ -11,8 +11,7 @@ use planner::ropes::{random_strike_target, trial_rope};
 use planner::synthetic::FilmNoise;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
-use rope_sim::AirDrag;
-use shared_types::RopeParams;
+use shared_types::{AirDrag, RopeParams};
 use std::f64::consts::TAU;
 
 /// Keeps these ropes apart from those of other studies.

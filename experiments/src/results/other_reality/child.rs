@@ -4,9 +4,9 @@
 use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::kinematics::FrameMotion;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
-use rope_sim::{AirDrag, FrameTimes};
+use rope_sim::FrameTimes;
 use serde::{Deserialize, Serialize};
-use shared_types::RopeParams;
+use shared_types::{AirDrag, RopeParams};
 use std::ffi::OsString;
 use std::process::{Command, Stdio};
 
@@ -246,7 +246,7 @@ mod tests {
                 lead_coefficient: 0.5,
             }),
             rest_curvature_per_m: [0.3, -0.4, 0.0],
-            mass_slope: 0.0,
+            ..RopeExtras::NONE
         };
         for (index, extras) in [(0, RopeExtras::NONE), (1, RopeExtras::NONE), (0, extras)] {
             let rope = trial_rope(1, index);
@@ -259,7 +259,8 @@ mod tests {
                 },
                 ..plain(rope, 1)
             };
-            let candidate = Candidate::new(&rope, &arm).with_extras(extras);
+            let rope = rope.with_extras(extras);
+            let candidate = Candidate::new(&rope, &arm);
             let ours = roll_out(&[candidate], &options).unwrap();
             let motion = |t_s| arm.at(t_s);
             let theirs = mujoco.simulate(&other, motion, 1, &times, 2).unwrap();
