@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
 use shared_types::rope::{LINK_COUNTS, RANGES, ROPE_PARAMETERS, RopePosterior};
 
+/// Draws until one is a rope: a wide posterior has tails that are none.
+const DRAWS_MAX: usize = 50;
+
 /// Ropes that a robust plan is optimised over, and others that its error is forecast with.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct PosteriorEnsemble {
@@ -15,6 +18,10 @@ pub struct PosteriorEnsemble {
     pub optimised: Vec<RopeParams>,
     /// Those its error is forecast with; none for no forecast.
     pub forecast: Vec<RopeParams>,
+    /// Ropes missing among those of the forecast, because nothing that was drawn for them
+    /// could be a rope.
+    #[serde(default)]
+    pub undrawn: u32,
 }
 
 impl PosteriorEnsemble {
@@ -22,7 +29,9 @@ impl PosteriorEnsemble {
     ///
     /// Parameters are taken for lognormal with the posterior's means and covariance, because
     /// what a film leaves open is a common factor of stiffness, damping and masses: ratios
-    /// stay as sharp as they were identified. The link count follows its probabilities.
+    /// stay as sharp as they were identified. The link count follows its probabilities, and
+    /// stiffness and damping of the joints follow the count: a film tells those per length.
+    /// What is no rope is drawn again.
     #[must_use]
     pub fn drawn(
         rope: &RopeParams,
@@ -31,56 +40,92 @@ impl PosteriorEnsemble {
         forecast: usize,
         seed: u64,
     ) -> Self {
-        const N: usize = ROPE_PARAMETERS - 1;
-        let mean = |i: usize| posterior.mean[i + 1].max(1e-9);
-        let logs = SMatrix::<f64, N, N>::from_fn(|i, k| {
-            let relative = posterior.covariance[i + 1][k + 1] / (mean(i) * mean(k));
-            relative.max(-0.9).ln_1p()
-        });
-        // Rounding and moments of no lognormal may leave it slightly indefinite.
-        let eigen = logs.symmetric_eigen();
-        let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+        let logs = Logarithms::of(posterior);
         let mut rng = ChaCha12Rng::seed_from_u64(seed ^ 0xbe11_ef00);
-        let mut ropes: Vec<RopeParams> = (0..optimised + forecast)
-            .map(|_| {
-                let z = SVector::<f64, N>::from_fn(|i, _| {
-                    lengths[i] * rng.sample::<f64, _>(StandardNormal)
-                });
-                let shift = eigen.eigenvectors * z;
-                let mut values = rope.to_array();
-                values[0] = links(posterior, rope, rng.random());
-                for i in 0..N {
-                    values[i + 1] = (mean(i).ln() - logs[(i, i)] / 2.0 + shift[i]).exp();
-                }
-                let drawn = RopeParams {
-                    extras: rope.extras,
-                    ..RopeParams::from_array(values)
-                };
-                if drawn.validate().is_ok() {
-                    drawn
-                } else {
-                    *rope
-                }
-            })
-            .collect();
-        let forecast = ropes.split_off(optimised);
+        let mut draw = |_| {
+            (0..DRAWS_MAX)
+                .map(|_| logs.draw(rope, posterior, &mut rng))
+                .find(|drawn| drawn.validate().is_ok())
+        };
+        let optimised = (0..optimised).filter_map(&mut draw).collect();
+        let drawn: Vec<RopeParams> = (0..forecast).filter_map(&mut draw).collect();
         Self {
-            optimised: ropes,
-            forecast,
+            optimised,
+            undrawn: u32::try_from(forecast - drawn.len()).unwrap_or(u32::MAX),
+            forecast: drawn,
         }
     }
 }
 
+/// Parameters but for the link count.
+const OTHERS: usize = ROPE_PARAMETERS - 1;
+
+/// Normally distributed logarithms of the parameters: those of the others given that of the
+/// link count.
+struct Logarithms {
+    mean: SVector<f64, ROPE_PARAMETERS>,
+    /// Slope over the logarithm of the link count.
+    slope: SVector<f64, OTHERS>,
+    /// Square root of the covariance that is left when the link count is known.
+    root: SMatrix<f64, OTHERS, OTHERS>,
+}
+
+impl Logarithms {
+    fn of(posterior: &RopePosterior) -> Self {
+        let mean = |i: usize| posterior.mean[i].max(1e-9);
+        let logs = SMatrix::<f64, ROPE_PARAMETERS, ROPE_PARAMETERS>::from_fn(|i, k| {
+            let relative = posterior.covariance[i][k] / (mean(i) * mean(k));
+            relative.max(-0.9).ln_1p()
+        });
+        let with_links = logs.fixed_view::<OTHERS, 1>(1, 0).into_owned();
+        let slope = with_links / logs[(0, 0)].max(1e-12);
+        let given_links = logs.fixed_view::<OTHERS, OTHERS>(1, 1) - slope * with_links.transpose();
+        // Rounding and moments of no lognormal may leave it slightly indefinite.
+        let eigen = given_links.symmetric_eigen();
+        let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+        Self {
+            mean: SVector::from_fn(|i, _| mean(i).ln() - logs[(i, i)] / 2.0),
+            slope,
+            root: eigen.eigenvectors * SMatrix::from_diagonal(&lengths),
+        }
+    }
+
+    /// The rope with other values, which need not be those of any rope.
+    fn draw(
+        &self,
+        rope: &RopeParams,
+        posterior: &RopePosterior,
+        rng: &mut ChaCha12Rng,
+    ) -> RopeParams {
+        let normal = SVector::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
+        let links = links(posterior, rope, rng.random());
+        let more_links = f64::from(links).ln() - self.mean[0];
+        let shift = self.slope * more_links + self.root * normal;
+        let value = |i: usize| (self.mean[i] + shift[i - 1]).exp();
+        let mut drawn = *rope;
+        drawn.links = links;
+        drawn.length_m = value(1);
+        drawn.joint_damping_nms_per_rad = value(2);
+        drawn.joint_stiffness_nm_per_rad = value(3);
+        drawn.radius_m = value(4);
+        drawn.mass_per_length_kg_per_m = value(5);
+        drawn.lead_mass_kg = value(6);
+        drawn.lead_radius_m = value(7);
+        drawn.link_extra_scale = value(8);
+        drawn
+    }
+}
+
 /// The link count at a part of the cumulated probability.
-fn links(posterior: &RopePosterior, rope: &RopeParams, part: f64) -> f64 {
+fn links(posterior: &RopePosterior, rope: &RopeParams, part: f64) -> u32 {
     let mut left = part;
     for (i, p) in (0u32..).zip(posterior.links_probability.iter().take(LINK_COUNTS)) {
         left -= p;
         if left < 0.0 {
-            return RANGES[0].min + f64::from(i);
+            return RANGES[0].min as u32 + i;
         }
     }
-    f64::from(rope.links)
+    rope.links
 }
 
 #[cfg(test)]
@@ -126,5 +171,104 @@ mod tests {
         assert!((m - 22.5).abs() < 0.05, "{m}");
         let few = PosteriorEnsemble::drawn(&rope, &posterior, 5, 0, 1);
         assert_eq!(drawn[..5], few.optimised);
+    }
+
+    /// Mean and covariance of some ropes, and the probabilities of their link counts.
+    fn posterior_of(ropes: &[RopeParams]) -> RopePosterior {
+        let count = ropes.len() as f64;
+        let all: Vec<[f64; ROPE_PARAMETERS]> = ropes.iter().map(RopeParams::to_array).collect();
+        let mean =
+            |of: &dyn Fn(&[f64; ROPE_PARAMETERS]) -> f64| all.iter().map(of).sum::<f64>() / count;
+        let means: [f64; ROPE_PARAMETERS] = core::array::from_fn(|i| mean(&|v| v[i]));
+        RopePosterior {
+            mean: means,
+            covariance: core::array::from_fn(|i| {
+                core::array::from_fn(|k| mean(&|v| (v[i] - means[i]) * (v[k] - means[k])))
+            }),
+            interval_90: [[0.0; 2]; ROPE_PARAMETERS],
+            links_probability: core::array::from_fn(|i| {
+                mean(&|v| f64::from(u8::from(v[0] == RANGES[0].min + i as f64)))
+            }),
+            ambiguities: Vec::new(),
+            inflation: 1.0,
+        }
+    }
+
+    /// What a throw depends on: logarithms of bending stiffness, of damping and of the lead's
+    /// mass, over the mass per length; and the link count.
+    fn ratios(rope: &RopeParams) -> [f64; 4] {
+        let (s, mu) = (rope.link_length_m(), rope.mass_per_length_kg_per_m);
+        [
+            (rope.joint_stiffness_nm_per_rad * s / mu).ln(),
+            (rope.joint_damping_nms_per_rad * s / mu).ln(),
+            (rope.lead_mass_kg / mu).ln(),
+            f64::from(rope.links),
+        ]
+    }
+
+    fn deviations(ropes: &[RopeParams]) -> [f64; 4] {
+        let all: Vec<[f64; 4]> = ropes.iter().map(ratios).collect();
+        let count = all.len() as f64;
+        core::array::from_fn(|i| {
+            let mean = all.iter().map(|r| r[i]).sum::<f64>() / count;
+            let squares = all.iter().map(|r| (r[i] - mean).powi(2));
+            (squares.sum::<f64>() / count).sqrt()
+        })
+    }
+
+    /// A film tells bending stiffness and damping per length to 1 and 2 %, but hardly the link
+    /// count, nor the common factor of stiffness, damping and masses.
+    #[test]
+    fn drawn_ropes_bend_as_sharply_as_identified_whatever_their_link_count() {
+        let rope = RopeParams::from_array([23.0, 0.55, 0.006, 0.15, 0.006, 0.05, 0.05, 0.03, 0.9]);
+        let mut rng = ChaCha12Rng::seed_from_u64(3);
+        let mut known = || {
+            let mut error =
+                |std_dev: f64| -> f64 { (std_dev * rng.sample::<f64, _>(StandardNormal)).exp() };
+            let (stiffness, damping, lead) = (error(0.01), error(0.02), error(0.01));
+            let (length, links) = (error(0.002), (23.0 * error(0.07)).round());
+            let mass: f64 = rng.random_range(0.6..1.4);
+            let per_joint = links / f64::from(rope.links) / length * mass;
+            RopeParams {
+                links: (links as u32).clamp(20, 26),
+                length_m: rope.length_m * length,
+                joint_stiffness_nm_per_rad: rope.joint_stiffness_nm_per_rad * stiffness * per_joint,
+                joint_damping_nms_per_rad: rope.joint_damping_nms_per_rad * damping * per_joint,
+                mass_per_length_kg_per_m: rope.mass_per_length_kg_per_m * mass,
+                lead_mass_kg: rope.lead_mass_kg * lead * mass,
+                ..rope
+            }
+        };
+        let known: Vec<RopeParams> = (0..4096).map(|_| known()).collect();
+        let posterior = posterior_of(&known);
+        let drawn = PosteriorEnsemble::drawn(&rope, &posterior, 4096, 0, 1).optimised;
+        let (is, was) = (deviations(&drawn), deviations(&known));
+        for (is, was) in is.into_iter().zip(was) {
+            assert!((0.85..1.15).contains(&(is / was)), "{is} of {was}");
+        }
+    }
+
+    /// Lead radii a hundred times too uncertain: many draws are larger than any lead.
+    #[test]
+    fn what_is_no_rope_is_drawn_again_or_counted() {
+        let rope = RopeParams::from_array([23.0, 0.55, 0.006, 0.15, 0.006, 0.05, 0.05, 0.03, 0.9]);
+        let mut posterior = posterior_of(&[rope]);
+        posterior.mean[7] = 0.4;
+        posterior.covariance[7][7] = 0.16;
+        let drawn = PosteriorEnsemble::drawn(&rope, &posterior, 20, 200, 1);
+        let ropes = [&drawn.optimised[..], &drawn.forecast].concat();
+        assert_eq!((ropes.len(), drawn.undrawn), (220, 0));
+        for (i, drawn) in ropes.iter().enumerate() {
+            assert!(
+                drawn.validate().is_ok() && !ropes[..i].contains(drawn),
+                "{drawn:?}"
+            );
+        }
+        posterior.mean[7] = 40.0;
+        let none = PosteriorEnsemble::drawn(&rope, &posterior, 2, 3, 1);
+        assert_eq!(
+            (none.optimised.len(), none.forecast.len(), none.undrawn),
+            (0, 0, 3)
+        );
     }
 }

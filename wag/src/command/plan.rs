@@ -3,7 +3,7 @@
 use super::unconfirmed::confirm;
 use crate::cli::PlanArgs;
 use crate::config;
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use arm_model::Limits;
 use cli_output::{Failure, OrInput, Outcome, Stage, output};
 use planner::PlannerConfig;
@@ -52,13 +52,15 @@ fn ensemble(args: &PlanArgs) -> anyhow::Result<PosteriorEnsemble> {
             args.rope.display()
         )
     })?;
-    Ok(PosteriorEnsemble::drawn(
-        &rope,
-        &posterior,
-        args.robust,
-        FORECAST_ROPES,
-        args.seed,
-    ))
+    let drawn = PosteriorEnsemble::drawn(&rope, &posterior, args.robust, FORECAST_ROPES, args.seed);
+    let count = drawn.optimised.len();
+    ensure!(
+        count == args.robust,
+        "what rope file `{}` leaves open is hardly ever a rope: {count} of {} could be drawn; film and identify it again",
+        args.rope.display(),
+        args.robust
+    );
+    Ok(drawn)
 }
 
 /// Draws which targets the rope reaches; refuses one that it does not.
