@@ -33,7 +33,7 @@ fn risk(mut values: Vec<f64>) -> f64 {
 
 impl Setup<'_> {
     /// The throw with the least risk over the ropes of the ensemble: the best of the
-    /// finalists, and what a search around it finds.
+    /// finalists, or what a search around it finds if that is better.
     pub(super) fn robust(
         &self,
         finalists: Vec<Finalist>,
@@ -47,7 +47,7 @@ impl Setup<'_> {
         count.add(trajectories.len() * ropes);
         let best = compared.into_iter().zip(risks);
         let best = best.min_by(|(_, a), (_, b)| a.fitness.total_cmp(&b.fitness));
-        let Some((around, _)) = best else {
+        let Some((around, risk_around)) = best else {
             return Ok(None);
         };
         let search = Search {
@@ -61,14 +61,20 @@ impl Setup<'_> {
             keep: 1,
         };
         let (found, spent) = self.explore(&search, |t| self.risks(t), progress)?;
-        let ropes = u32::try_from(ropes).unwrap_or(1);
-        count.simulations += spent.simulations.saturating_mul(ropes);
-        let best = self.finalists(found, count)?.into_iter().next();
-        Ok(Some(best.unwrap_or(around)))
+        count.add(ropes * spent.simulations as usize);
+        count.interrupted |= spent.interrupted;
+        let Some(best) = self.finalists(found, count)?.into_iter().next() else {
+            return Ok(Some(around));
+        };
+        // The search draws around its start, which is polished and may stay the best.
+        let risks = self.risks(&[best.trajectory])?;
+        count.add(ropes);
+        let is_better = risks.iter().all(|r| r.fitness < risk_around.fitness);
+        Ok(Some(if is_better { best } else { around }))
     }
 
     /// Risk of each throw over the ropes of the ensemble.
-    fn risks(&self, trajectories: &[JointTrajectory]) -> Result<Vec<Valued>, PlanError> {
+    pub(super) fn risks(&self, trajectories: &[JointTrajectory]) -> Result<Vec<Valued>, PlanError> {
         let ropes = &self.request.ensemble.optimised;
         let throws: Vec<_> = trajectories
             .iter()

@@ -80,6 +80,20 @@ fn a_small_search_is_polished_onto_the_target_and_keeps_every_limit() {
     assert!(rough > found.predicted_error_m, "{rough}");
 }
 
+/// A search of all joints for the rope that a throw was polished for ends off the target.
+#[test]
+fn a_robust_plan_is_no_riskier_than_the_throw_it_starts_from() {
+    let mut r = request([0.95, 0.25, 0.1]);
+    r.options.dimensions = Dimensions::Full;
+    let plain = plan(&r, &mut go_on).unwrap();
+    r.ensemble.optimised = vec![r.rope; 2];
+    let robust = plan(&r, &mut go_on).unwrap();
+    let setup = Setup::new(r.goal.task(), &r).unwrap();
+    let risks = setup.risks(&[plain.trajectory, robust.trajectory]).unwrap();
+    let [plain, robust] = [0, 1].map(|i| risks[i].fitness);
+    assert!(robust <= plain, "{robust} after {plain}");
+}
+
 /// Byte for byte, as it would be written down.
 #[test]
 fn same_plan_for_one_two_and_four_threads() {
