@@ -73,6 +73,10 @@ pub enum LimitedBy {
 pub struct ErrorForecast {
     /// Ropes drawn from what is known about the rope.
     pub ropes: u32,
+    /// How many of them could not be simulated; they count as misses by the rope's length or
+    /// by the largest error, whichever is more.
+    #[serde(default)]
+    pub failed: u32,
     /// Mean error over them (m).
     pub mean_m: f64,
     /// Median error (m).

@@ -25,8 +25,7 @@ const SEARCHES: usize = 3;
 struct Foreseen {
     /// What it did.
     strike: Strikes,
-    /// What the posterior of the rope let expect; `None` where no drawn rope could be
-    /// simulated.
+    /// What the posterior of the rope let expect.
     forecast: Option<ErrorForecast>,
 }
 
@@ -153,6 +152,7 @@ mod tests {
             },
             forecast: Some(ErrorForecast {
                 ropes: 64,
+                failed: 0,
                 mean_m: 0.01,
                 median_m: 0.01,
                 interval_90_m: [0.002, 0.02],

@@ -51,7 +51,13 @@ pub fn warnings(plan: &Plan) -> Vec<String> {
         .interrupted
         .then(|| "the search was interrupted: this is the best throw up to then".to_owned());
     let poor = shortcoming(plan).map(|s| s.message);
-    poor.into_iter().chain(interrupted).collect()
+    let failed = plan.forecast.filter(|f| f.failed > 0).map(|f| {
+        format!(
+            "{} of {} ropes it might be could not be simulated: they count as misses in the forecast",
+            f.failed, f.ropes
+        )
+    });
+    poor.into_iter().chain(interrupted).chain(failed).collect()
 }
 
 #[cfg(test)]

@@ -99,36 +99,63 @@ impl Setup<'_> {
         &self,
         trajectory: &JointTrajectory,
     ) -> Result<Option<ErrorForecast>, PlanError> {
-        let ropes = &self.request.ensemble.forecast;
-        if ropes.is_empty() {
-            return Ok(None);
-        }
-        let throws: Vec<_> = ropes.iter().map(|r| (r, trajectory)).collect();
-        let outcomes = self.judging.run(&throws)?;
+        let ensemble = &self.request.ensemble;
+        let throws: Vec<_> = ensemble.forecast.iter().map(|r| (r, trajectory)).collect();
+        let outcomes = if throws.is_empty() {
+            Vec::new()
+        } else {
+            self.judging.run(&throws)?
+        };
         let finite = outcomes.iter().filter(|o| o.finite);
-        let mut errors: Vec<f64> = finite.map(|o| self.task.error_m(o)).collect();
-        errors.sort_by(f64::total_cmp);
-        if errors.is_empty() {
-            return Ok(None);
-        }
-        let at = |part: f64| errors[(part * (errors.len() - 1) as f64).round() as usize];
-        Ok(Some(ErrorForecast {
-            ropes: u32::try_from(errors.len()).unwrap_or(u32::MAX),
-            mean_m: errors.iter().sum::<f64>() / errors.len() as f64,
-            median_m: at(0.5),
-            interval_90_m: [at(0.05), at(0.95)],
-        }))
+        let errors = finite.map(|o| self.task.error_m(o));
+        let errors: Vec<f64> = errors.filter(|e| e.is_finite()).collect();
+        let failed = throws.len() - errors.len() + ensemble.undrawn as usize;
+        Ok(error_forecast(errors, failed, self.request.rope.length_m))
     }
+}
+
+/// The forecast from errors of simulated throws, and how many of them failed. These are
+/// misses, not nothing: as far off as the worst, and as the rope is long.
+fn error_forecast(mut errors_m: Vec<f64>, failed: usize, length_m: f64) -> Option<ErrorForecast> {
+    let worst_m = errors_m.iter().copied().fold(length_m, f64::max);
+    errors_m.extend(core::iter::repeat_n(worst_m, failed));
+    if errors_m.is_empty() {
+        return None;
+    }
+    errors_m.sort_by(f64::total_cmp);
+    let at = |part: f64| errors_m[(part * (errors_m.len() - 1) as f64).round() as usize];
+    Some(ErrorForecast {
+        ropes: u32::try_from(errors_m.len()).unwrap_or(u32::MAX),
+        failed: u32::try_from(failed).unwrap_or(u32::MAX),
+        mean_m: errors_m.iter().sum::<f64>() / errors_m.len() as f64,
+        median_m: at(0.5),
+        interval_90_m: [at(0.05), at(0.95)],
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::risk;
+    use super::{error_forecast, risk};
 
     #[test]
     fn the_worst_fifth_counts_four_times_as_much() {
         let values = vec![1.0, 2.0, 3.0, 4.0, 10.0];
         assert!((risk(values) - (4.0 + 3.0 * 10.0)).abs() < 1e-12);
         assert!((risk(vec![2.0]) - 8.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ropes_that_cannot_be_simulated_are_misses_in_the_forecast() {
+        let errors_m = vec![0.02, 0.01, 0.03, 0.01, 0.02, 0.01, 0.02, 0.01];
+        let whole = error_forecast(errors_m.clone(), 0, 0.5).unwrap();
+        assert_eq!((whole.ropes, whole.failed), (8, 0));
+        assert_eq!(whole.interval_90_m, [0.01, 0.03]);
+        let with_failures = error_forecast(errors_m, 2, 0.5).unwrap();
+        assert_eq!((with_failures.ropes, with_failures.failed), (10, 2));
+        assert_eq!(with_failures.interval_90_m, [0.01, 0.5]);
+        assert!((with_failures.mean_m - 0.113).abs() < 1e-12);
+        assert_eq!(error_forecast(vec![0.7], 1, 0.5).unwrap().mean_m, 0.7);
+        assert_eq!(error_forecast(Vec::new(), 3, 0.5).unwrap().median_m, 0.5);
+        assert_eq!(error_forecast(Vec::new(), 0, 0.5), None);
     }
 }
