@@ -13,6 +13,7 @@ use super::posterior::{posterior, std_dev};
 use super::propose::{fast_search, from_proposal};
 use super::refine::{Refined, refine};
 use super::search::search;
+use super::steps::short_enough;
 use crate::observation::Observation;
 use shared_types::ipc::message::Progress;
 use shared_types::rope::{FitCircumstances, OutOfDistribution};
@@ -124,10 +125,14 @@ impl Fit<'_> {
         start: &Point,
         distance_px: f64,
     ) -> Result<Refined, IdentifyError> {
-        let noise_px = distance_px / 2.0_f64.sqrt();
-        let (film, budget) = (&self.film, &mut self.budget);
-        let plain = refine(film, coordinates, &[*start], noise_px, budget)?;
-        beyond(film, coordinates, plain, budget)
+        let budget = &mut self.budget;
+        let plain = short_enough(&mut self.film, |film, from| {
+            let from = from.map(|fit| (&fit.x, fit.at.distance_px));
+            let (start, distance_px) = from.unwrap_or((start, distance_px));
+            let noise_px = distance_px / 2.0_f64.sqrt();
+            refine(film, coordinates, &[*start], noise_px, budget)
+        })?;
+        beyond(&self.film, coordinates, plain, &mut self.budget)
     }
 
     /// The global search, refined.

@@ -30,6 +30,7 @@ mod propose;
 mod refine;
 pub mod scale;
 mod search;
+mod steps;
 
 pub use error::IdentifyError;
 pub use fit::WIDE;
