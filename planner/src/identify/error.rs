@@ -6,6 +6,7 @@ use cmaes::CmaError;
 use rope_sim::SimulateError;
 use rope_sim::sensitivity::SensitivityError;
 use shared_types::keypoints::KeypointError;
+use shared_types::rope::RopeError;
 
 /// Why no rope was identified.
 #[derive(Debug, thiserror::Error)]
@@ -21,6 +22,11 @@ pub enum IdentifyError {
         "no simulated rope projects into the picture: check the camera's extrinsics and the attach frame's motion"
     )]
     NothingVisible,
+    /// The rope that fits the film best cannot be one.
+    #[error(
+        "no rope fits the film: {0}; check the camera, the motion and a weighed lead, and film again"
+    )]
+    NoRope(#[from] RopeError),
     /// An option is out of range.
     #[error("option {0}")]
     Option(#[from] OutOfRange),
@@ -53,6 +59,7 @@ impl IdentifyError {
             Self::Keypoints(_)
                 | Self::Film(_)
                 | Self::NothingVisible
+                | Self::NoRope(_)
                 | Self::Option(_)
                 | Self::Network(PredictError::Observe(_))
         )

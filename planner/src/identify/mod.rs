@@ -12,6 +12,7 @@
 mod beyond;
 mod budget;
 mod camera_pose;
+mod centre;
 mod clock;
 mod coarse;
 mod coordinates;
@@ -31,6 +32,8 @@ mod refine;
 pub mod scale;
 mod search;
 mod steps;
+#[cfg(test)]
+mod tests;
 
 pub use error::IdentifyError;
 pub use fit::WIDE;
@@ -74,5 +77,7 @@ pub fn identify(
             network::proposal(net, observation)?.map_or(Start::FastSearch, Start::Proposal)
         }
     };
-    fit(observation, options, &start, progress)
+    let found = fit(observation, options, &start, progress)?;
+    found.params.validate()?;
+    Ok(found)
 }

@@ -7,15 +7,13 @@
 //! its own density (see [`super::scale`]). Moments and quantiles are those of the
 //! drawn ropes.
 
-use super::coordinates::{
-    DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, Point, STIFFNESS, extras_of, link_range,
-    parameter,
-};
+use super::centre::{Centre, Vector};
+use super::coordinates::{LINKS, Point, extras_of, link_range, parameter};
 use super::film::Film;
 use super::refine::Refined;
 use super::scale;
 use crate::observation::Appearance;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
@@ -33,27 +31,28 @@ const NINE_TENTHS: f64 = 0.9;
 /// Fraction of the prior's deviation above which a direction was not seen.
 pub(super) const UNSEEN_FRACTION: f64 = 0.7;
 
-/// Coordinates drawn, in this order.
-const DRAWN: [usize; 5] = [LENGTH, STIFFNESS, DAMPING, LEAD_MASS, LEAD_RADIUS];
-type Vector = SVector<f64, 5>;
-
 /// One drawn rope.
 struct Draw {
     values: [f64; ROPE_PARAMETERS],
     coordinates: Vector,
+    /// Where the fit is likeliest with its link count.
+    centre: Vector,
+    /// Whether it could be a rope at all.
+    is_possible: bool,
     weight: f64,
 }
 
 /// The parameters' posterior with its likeliest rope, from ropes drawn from a fit.
 pub(super) fn posterior(fit: &Refined, film: &Film<'_>) -> (RopeParams, RopePosterior) {
-    let mut draws = draw(fit, film);
+    let centre = Centre::of(fit, film);
+    let mut draws = draw(fit, &centre, film);
     let total: f64 = draws.iter().map(|d| d.weight).sum();
     let squares: f64 = draws.iter().map(|d| d.weight * d.weight).sum();
     let within_ranges = total > 0.0 && total * total / squares >= EFFECTIVE_MIN;
     if !within_ranges {
         // The ranges are no part of what is known about a rope outside them.
         for d in &mut draws {
-            d.weight = 1.0;
+            d.weight = f64::from(u8::from(d.is_possible));
         }
     }
     let total: f64 = draws.iter().map(|d| d.weight).sum();
@@ -61,7 +60,7 @@ pub(super) fn posterior(fit: &Refined, film: &Film<'_>) -> (RopeParams, RopePost
         d.weight /= total;
     }
     let posterior = summarise(&draws, fit);
-    let params = likeliest(&draws, &posterior, film.options.lead_mass_kg, &fit.x);
+    let params = likeliest(&draws, &posterior, film.options.lead_mass_kg, (&centre, &fit.x));
     (params, posterior)
 }
 
@@ -79,17 +78,11 @@ fn count_probabilities(mean: f64, variance: f64) -> [f64; LINK_COUNTS] {
     weights.map(|w| w / total)
 }
 
-fn draw(fit: &Refined, film: &Film<'_>) -> Vec<Draw> {
+fn draw(fit: &Refined, centre: &Centre, film: &Film<'_>) -> Vec<Draw> {
     use parameter as p;
     let (appearance, pixel_m) = (film.observation.appearance, film.viewer.pixel_m());
     let mut rng = ChaCha12Rng::seed_from_u64(film.options.seed ^ 0x9057_e210);
-    let covariance = SMatrix::<f64, 5, 5>::from_fn(|i, j| fit.covariance[(DRAWN[i], DRAWN[j])]);
-    let with_links = Vector::from_fn(|i, _| fit.covariance[(DRAWN[i], LINKS)]);
-    let variance = fit.covariance[(LINKS, LINKS)].max(1e-9);
-    let given_links = (covariance - with_links * with_links.transpose() / variance) * fit.inflation;
-    let root = given_links
-        .cholesky()
-        .map_or_else(SMatrix::zeros, |c| c.l());
+    let root = centre.root(fit.inflation);
     let (low, _) = link_range();
     // The variance of the count from the fit alone.
     let counts_variance = fit.covariance[(LINKS, LINKS)] * fit.inflation + LINKS_STD.powi(2);
@@ -107,9 +100,8 @@ fn draw(fit: &Refined, film: &Film<'_>) -> Vec<Draw> {
                 links += 1.0;
             }
             let normal = Vector::from_fn(|_, _| rng.sample(StandardNormal));
-            let x = Vector::from_fn(|i, _| fit.x[DRAWN[i]])
-                + with_links * ((links - fit.x[LINKS]) / variance)
-                + root * normal;
+            let centre = centre.given(links);
+            let x = centre + root * normal;
             let s = x[0].max(1e-3) / links;
             let ratios = [x[1].exp() / s, x[2].exp() / s, x[3].exp()];
             let drawn = scale::draw(
@@ -143,6 +135,8 @@ fn draw(fit: &Refined, film: &Film<'_>) -> Vec<Draw> {
             Draw {
                 values,
                 coordinates: x,
+                centre,
+                is_possible: RopeParams::from_array(values).validate().is_ok(),
                 weight: if inside { drawn.density } else { 0.0 },
             }
         })
@@ -268,12 +262,10 @@ fn likeliest(
     draws: &[Draw],
     posterior: &RopePosterior,
     lead_mass_kg: Option<f64>,
-    fitted: &Point,
+    (centre, fitted): (&Centre, &Point),
 ) -> RopeParams {
-    let mut x = Vector::zeros();
-    for d in draws {
-        x += d.coordinates * d.weight;
-    }
+    let mean = |of: fn(&Draw) -> Vector| -> Vector { draws.iter().map(|d| of(d) * d.weight).sum() };
+    let x = centre.near(mean(|d| d.coordinates), mean(|d| d.centre));
     // The median, like that of the common factor: the least mean error.
     let [links] = quantiles(draws, |d| d.values[parameter::LINKS], [0.5]);
     let [median] = quantiles(draws, |d| d.values[parameter::MASS_PER_LENGTH], [0.5]);

@@ -1,0 +1,131 @@
+//! Parts of a fit, on films without noise by a camera whose place is known.
+
+use super::budget::Budget;
+use super::coordinates::{
+    DAMPING, LEAD_RADIUS, LENGTH, LINKS, Point, Reach, STIFFNESS, parameter, point_of,
+};
+use super::film::Film;
+use super::options::IdentifyOptions;
+use super::posterior::posterior;
+use super::refine::{Refined, refine};
+use super::steps::short_enough;
+use crate::observation::{Appearance, Observation, ObservedPoints};
+use crate::ropes::{random_rope, trial_rope};
+use crate::synthetic::{FilmNoise, FilmTiming, film, side_camera};
+use crate::wiggle::{WiggleConfig, wiggling_arm};
+use shared_types::RopeParams;
+use shared_types::rope::RANGES;
+use std::ops::ControlFlow;
+
+fn with_film<T>(rope: &RopeParams, look: impl FnOnce(&mut Film<'_>, &mut Budget<'_>) -> T) -> T {
+    let arm = wiggling_arm(&WiggleConfig::default()).unwrap();
+    let camera = side_camera();
+    let (timing, noise) = (FilmTiming::default(), FilmNoise::default());
+    let filmed = film(rope, &arm, &camera, 24, &timing, &noise).unwrap();
+    let observation = Observation {
+        track: &filmed.track,
+        points: ObservedPoints::ArcLength,
+        camera: &camera,
+        motion: &arm,
+        appearance: Appearance::default(),
+    };
+    let options = IdentifyOptions {
+        camera_position_std_m: 1e-4,
+        camera_look_at_std_m: 1e-4,
+        camera_roll_std_rad: 1e-4,
+        ..IdentifyOptions::default()
+    };
+    let mut budget = Budget {
+        simulations: 0,
+        steps: 0,
+        steps_max: 30,
+        progress: &mut |_| ControlFlow::Continue(()),
+    };
+    look(&mut Film::new(&observation, &options), &mut budget)
+}
+
+fn refined(film: &Film<'_>, reach: Reach, start: &Point, budget: &mut Budget<'_>) -> Refined {
+    let coordinates = film.coordinates(film.clock_window(), reach);
+    refine(film, &coordinates, start, 0.1, budget).unwrap()
+}
+
+/// A fit from the rope's own parameters on: how far it ends from them, and in which steps (s).
+fn fitted(rope: &RopeParams) -> (Point, f64) {
+    let truth = point_of(rope);
+    with_film(rope, |film, budget| {
+        let found = short_enough(film, |film, from| {
+            let start = from.map_or(&truth, |from| &from.x);
+            Ok(refined(film, Reach::Wide, start, budget))
+        });
+        (found.unwrap().x - truth, film.options.step_s)
+    })
+}
+
+#[test]
+fn a_slack_heavy_rope_is_fitted_in_shorter_steps_and_a_rope_of_the_ranges_is_not() {
+    let (_, step_s) = fitted(&trial_rope(2, 9));
+    assert_eq!(step_s, IdentifyOptions::default().step_s);
+    let slack = RopeParams {
+        joint_stiffness_nm_per_rad: 1e-3,
+        joint_damping_nms_per_rad: 4e-4,
+        mass_per_length_kg_per_m: 0.2,
+        lead_mass_kg: 0.02,
+        ..trial_rope(2, 8)
+    };
+    let (off, step_s) = fitted(&slack);
+    assert!(step_s < IdentifyOptions::default().step_s);
+    // In the usual steps 3 % of stiffness and damping.
+    assert!(off[LENGTH].abs() < 1e-3, "{off}");
+    assert!(
+        off[STIFFNESS].abs() < 0.015 && off[DAMPING].abs() < 0.015,
+        "{off}"
+    );
+}
+
+/// A rope a centimetre longer than the ranges know, whose film seems to contradict itself:
+/// all within the ranges is a centimetre off, but not unlikely.
+#[test]
+fn a_film_that_contradicts_itself_still_gets_the_rope_that_fits_it() {
+    let rope = RopeParams {
+        length_m: RANGES[parameter::LENGTH].max + 0.01,
+        ..random_rope(2)
+    };
+    with_film(&rope, |film, budget| {
+        let mut fit = refined(film, Reach::Ranges, &point_of(&rope), budget);
+        for inflation in [1.0, 1e3, 1e4, 1e5] {
+            fit.inflation = inflation;
+            let (params, posterior) = posterior(&fit, film);
+            let off_m = params.length_m - rope.length_m;
+            assert!(off_m.abs() < 1e-3, "{inflation}: {off_m}");
+            let is_within = posterior.interval_90[parameter::LENGTH][1] < 0.65;
+            assert_eq!(is_within, (1e3..=1e4).contains(&inflation));
+        }
+    });
+}
+
+/// A tip of 5 g on a heavy rope: its radius hardly shows, and follows a link count that no
+/// rope of the ranges has.
+#[test]
+fn every_reported_rope_can_be_one() {
+    let rope = RopeParams {
+        mass_per_length_kg_per_m: 0.082,
+        length_m: 0.55,
+        lead_mass_kg: 0.005,
+        ..random_rope(1)
+    };
+    with_film(&rope, |film, budget| {
+        let mut fit = refined(film, Reach::Wide, &point_of(&rope), budget);
+        (fit.x[LINKS], fit.x[LEAD_RADIUS]) = (32.0, 0.003);
+        (
+            fit.covariance[(LINKS, LINKS)],
+            fit.covariance[(LEAD_RADIUS, LEAD_RADIUS)],
+        ) = (4.0, 4e-4);
+        for (i, k) in [(LINKS, LEAD_RADIUS), (LEAD_RADIUS, LINKS)] {
+            fit.covariance[(i, k)] = 0.9 * 2.0 * 0.02;
+        }
+        let (params, posterior) = posterior(&fit, film);
+        assert!(params.validate().is_ok(), "{params:?}");
+        assert!((params.length_m - rope.length_m).abs() < 2e-3, "{params:?}");
+        assert!(posterior.interval_90[parameter::LEAD_RADIUS][0] > 0.0);
+    });
+}
