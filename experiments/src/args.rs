@@ -130,7 +130,7 @@ pub struct ResultArgs {
     /// phi-train).
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// Result file (JSON); an interrupted run resumes from it. A picture of the result
+    /// Result file (JSON); the same program resumes from it when it was interrupted. A picture of the result
     /// (SVG) is drawn next to it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -169,8 +169,8 @@ pub struct TrackRoomsArgs {
     /// it. Left out, each film is rendered anew and removed.
     #[arg(long, value_name = "DIR")]
     pub films: Option<PathBuf>,
-    /// Folder for the results, a file a seed; an interrupted run resumes from it. Name a
-    /// new one for another tracker.
+    /// Folder for the results, a file a seed; the same program resumes from it when it was
+    /// interrupted. Name a new one for another tracker.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

@@ -14,6 +14,7 @@ extern crate cli_output;
 mod args;
 mod bench;
 mod network;
+mod program;
 mod report;
 mod results;
 mod rooms;

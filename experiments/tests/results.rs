@@ -33,6 +33,25 @@ fn trials_are_kept_and_an_interrupted_run_resumes() {
     assert_refused(&line(2, 4), &["seed 3"]);
 }
 
+/// Another program's trials may be those of another simulator.
+#[test]
+fn trials_that_another_program_kept_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    let line = format!(
+        "sysid --ropes 1 --seed 3 --method nn --out {}",
+        at("a.json")
+    );
+    let other = at("other");
+    std::fs::copy(env!("CARGO_BIN_EXE_experiments"), &other).unwrap();
+    let mut file = std::fs::File::options().append(true).open(&other).unwrap();
+    std::io::Write::write_all(&mut file, b"built anew").unwrap();
+    drop(file);
+    let mut command = std::process::Command::new(&other);
+    assert!(command.args(line.split(' ')).status().unwrap().success());
+    assert_refused(&line, &["a.json", "program", "--out"]);
+}
+
 #[test]
 fn the_network_answers_at_once_and_better_than_the_middle_of_the_ranges() {
     let report = report("sysid --ropes 24 --seed 5 --method nn");

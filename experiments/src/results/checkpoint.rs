@@ -10,7 +10,8 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Checkpoint<T> {
     pub name: String,
-    pub version: String,
+    /// Version and hash of the program that made the trials.
+    pub program: String,
     /// Seed of ropes, films and searches.
     pub seed: u64,
     pub method: String,
@@ -27,16 +28,16 @@ impl<T: Serialize + DeserializeOwned> Checkpoint<T> {
         let fail = || format!("result file `{}`", path.display());
         let found: Self = serde_json::from_str(&files::read_text(path)?).with_context(fail)?;
         let same = found.name == empty.name
-            && found.version == empty.version
+            && found.program == empty.program
             && found.seed == empty.seed
             && found.method == empty.method;
         if same {
             return Ok(found);
         }
         Err(anyhow!(
-            "is of `{}`, version {}, seed {}, method {}: name another file with --out, or remove it",
+            "is of `{}`, program {}, seed {}, method {}: name another file with --out, or remove it",
             found.name,
-            found.version,
+            found.program,
             found.seed,
             found.method
         ))
@@ -51,12 +52,13 @@ impl<T: Serialize + DeserializeOwned> Checkpoint<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::program::program;
 
     #[test]
     fn a_file_of_another_seed_is_refused_and_the_same_goes_on() {
         let empty = |seed| Checkpoint::<u8> {
             name: "sysid".to_owned(),
-            version: shared_types::VERSION.to_owned(),
+            program: program().unwrap(),
             seed,
             method: "hybrid".to_owned(),
             trials: Vec::new(),

@@ -4,6 +4,7 @@ use super::checkpoint::Checkpoint;
 use super::picture::{self, Curve};
 use crate::args::ResultArgs;
 use crate::network::with_network;
+use crate::program::program;
 use crate::report::{Column, joined, print_table};
 use cli_output::{OrInput, Outcome, Stage, interrupted};
 use experiments::trials::{Trial, TrialRig, run as identify_all};
@@ -108,7 +109,7 @@ impl<'a> Experiment<'a> {
         let count = sequence.count;
         let empty = Checkpoint {
             name: self.name.to_owned(),
-            version: shared_types::VERSION.to_owned(),
+            program: program().or_failed()?,
             seed: self.args.seed,
             method: sequence.method,
             trials: Vec::new(),

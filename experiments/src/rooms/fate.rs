@@ -17,7 +17,8 @@ pub(super) enum Fate {
 /// A film and what became of it, as kept in a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Tracked {
-    pub(super) version: String,
+    /// Version and hash of the program that tracked it.
+    pub(super) program: String,
     pub(super) scene: Scene,
     pub(super) fate: Fate,
     /// Why the tracker would not rely on it.

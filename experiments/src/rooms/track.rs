@@ -6,6 +6,7 @@ use super::score::Score;
 use super::summary::{Row, reliability, rows};
 use super::{each, folder_of};
 use crate::args::TrackRoomsArgs;
+use crate::program::program;
 use crate::report::{Column, print_table};
 use anyhow::{Context, ensure};
 use arm_model::Pole;
@@ -91,7 +92,7 @@ fn judge(folder: &Path, seed: u64, kind: Kind) -> anyhow::Result<Tracked> {
         }
     };
     Ok(Tracked {
-        version: shared_types::VERSION.to_owned(),
+        program: program()?,
         scene,
         fate,
         doubts,
@@ -108,10 +109,10 @@ fn result(args: &TrackRoomsArgs, seed: u64, kind: Kind) -> anyhow::Result<Tracke
         let fail = || format!("result `{}`", path.display());
         let found: Tracked = serde_json::from_str(&files::read_text(path)?).with_context(fail)?;
         ensure!(
-            found.version == shared_types::VERSION,
-            "{} is of version {}: name another folder with --out, or remove it",
+            found.program == program()?,
+            "{} is of program {}: name another folder with --out, or remove it",
             fail(),
-            found.version
+            found.program
         );
         return Ok(found);
     }

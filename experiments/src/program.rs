@@ -1,0 +1,25 @@
+//! Which program makes a result: kept trials of another would be those of another simulator,
+//! planner or tracker.
+
+use anyhow::Context;
+use planner::phi::hex;
+use sha2::{Digest, Sha256};
+use std::sync::OnceLock;
+
+/// Digits of the hash that are kept.
+const DIGITS: usize = 16;
+
+/// Version and hash of the running program's file, which changes with the code.
+pub(crate) fn program() -> anyhow::Result<String> {
+    static HASH: OnceLock<String> = OnceLock::new();
+    let hash = match HASH.get() {
+        Some(hash) => hash,
+        None => {
+            // The file that runs, even if another has taken its place since.
+            let file = std::fs::read("/proc/self/exe").context("this program's own file")?;
+            let hash = hex(Sha256::digest(file).as_slice());
+            HASH.get_or_init(|| hash[..DIGITS].to_owned())
+        }
+    };
+    Ok(format!("{}-{hash}", shared_types::VERSION))
+}
