@@ -92,8 +92,7 @@ impl Case {
         let (curved, tilted, swung) = (direction(), direction(), direction());
         let camera = [direction(), direction(), direction()];
         let friction = Friction {
-            moment_nm: uniform(0.02_f64.ln(), 0.2_f64.ln()).exp()
-                * bending_moment_nm(&params, uniform(0.1, 0.3)),
+            moment_nm: uniform(0.02, 0.2) * bending_moment_nm(&params, uniform(0.1, 0.3)),
             slip_curvature_rad_per_m: uniform(0.2, 1.5),
         };
         let curvature = curved * uniform(0.2, 0.6);

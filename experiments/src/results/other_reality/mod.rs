@@ -259,7 +259,9 @@ const TABLE: [Column<Row>; 11] = [
     ("out of distribution, score", |row| {
         format!("{:.2}", row.out_of_distribution)
     }),
-    ("told", |row| format!("{:.0} %", 100.0 * row.outside)),
+    ("flagged as outside", |row| {
+        format!("{:.0} %", 100.0 * row.outside)
+    }),
     ("within its 90 % interval, up to (cm)", |row| {
         format!("{:.0} %, {}", 100.0 * row.covered, cm(row.forecast_high_m))
     }),
