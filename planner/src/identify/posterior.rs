@@ -60,7 +60,12 @@ pub(super) fn posterior(fit: &Refined, film: &Film<'_>) -> (RopeParams, RopePost
         d.weight /= total;
     }
     let posterior = summarise(&draws, fit);
-    let params = likeliest(&draws, &posterior, film.options.lead_mass_kg, (&centre, &fit.x));
+    let params = likeliest(
+        &draws,
+        &posterior,
+        film.options.lead_mass_kg,
+        (&centre, &fit.x),
+    );
     (params, posterior)
 }
 

@@ -202,7 +202,8 @@ mod tests {
     use super::*;
     use planner::ropes::trial_rope;
     use planner::wiggle::{WiggleConfig, wiggling_arm};
-    use rope_sim::{AttachMotion, Candidate, Precision, RopeExtras, SimOptions, roll_out};
+    use rope_sim::{AttachMotion, Candidate, Precision, SimOptions, roll_out};
+    use shared_types::RopeExtras;
 
     /// The Python, or nothing where there is none: said aloud, and a failure in CI.
     fn mujoco() -> Option<Mujoco> {
