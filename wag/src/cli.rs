@@ -307,6 +307,9 @@ pub struct IdentifyArgs {
     /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
     #[arg(long, allow_negative_numbers = true, value_parser = mass_kg)]
     pub lead_mass: Option<f64>,
+    /// Length of the rope measured by tape, clamp to lead centre (m); taken to be right to 2 mm.
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub length: Option<f64>,
     /// Seed of the search.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,

@@ -96,6 +96,8 @@ pub(super) mod parameter {
 /// Mass per length of simulated ropes (kg/m): any would do, see the module; small, so
 /// that the stiffest ropes of a wide search stay within what the simulator accepts.
 const SIMULATED_MASS_PER_LENGTH: f64 = 0.01;
+/// Deviation of a length measured by tape (m).
+const TAPE_STD_M: f64 = 2e-3;
 /// Radius of simulated ropes (m): too small to rule the link inertia.
 const SIMULATED_RADIUS_M: f64 = 1e-4;
 
@@ -261,6 +263,17 @@ impl Coordinates {
             out.prior_std[CAMERA + i] = *std_dev;
         }
         out
+    }
+
+    /// The same for a rope whose length was measured by tape (m).
+    pub(super) fn measured(mut self, length_m: Option<f64>) -> Self {
+        if let Some(length_m) = length_m {
+            self.lower[LENGTH] = self.lower[LENGTH].min(length_m);
+            self.upper[LENGTH] = self.upper[LENGTH].max(length_m);
+            self.prior_mean[LENGTH] = length_m;
+            self.prior_std[LENGTH] = TAPE_STD_M;
+        }
+        self
     }
 
     /// The same with what real ropes have beyond the nine parameters, and a swing at the

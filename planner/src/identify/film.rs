@@ -158,7 +158,9 @@ impl<'a> Film<'a> {
     /// The coordinates in which the film is fitted.
     pub(super) fn coordinates(&self, clock: ClockWindow, reach: Reach) -> Coordinates {
         let (seen, pixel_m) = (self.observation.appearance, self.viewer.pixel_m());
-        Coordinates::new(seen, pixel_m, clock, &self.options.camera_std(), reach)
+        let camera_std = self.options.camera_std();
+        let coordinates = Coordinates::new(seen, pixel_m, clock, &camera_std, reach);
+        coordinates.measured(self.options.length_m)
     }
 
     /// How the filmed motion is simulated.

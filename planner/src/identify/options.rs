@@ -55,6 +55,8 @@ pub struct IdentifyOptions {
     pub search_frames_max: usize,
     /// Mass of the lead if it was weighed; fixes the scale of all masses (kg).
     pub lead_mass_kg: Option<f64>,
+    /// Length of the rope if it was measured by tape, clamp to lead centre (m).
+    pub length_m: Option<f64>,
     /// Largest offset between the clocks of arm and camera (s).
     pub clock_offset_max_s: f64,
     /// Deviation of the camera's position in each direction (m).
@@ -92,6 +94,7 @@ impl Default for IdentifyOptions {
             threads: 2,
             search_frames_max: 100,
             lead_mass_kg: None,
+            length_m: None,
             clock_offset_max_s: 0.4,
             camera_position_std_m: 0.02,
             camera_look_at_std_m: 0.02,
@@ -147,6 +150,7 @@ fn check_options(o: &IdentifyOptions) -> Result<(), IdentifyError> {
     const DEVIATION: &str = "above 0 and at most 1 (m, rad)";
     const CLOCK: &str = "0.001 to 1 s";
     const LEAD: &str = "above 0 and below 10 kg";
+    const TAPE: &str = "0.05 to 5 m";
     let within = |option, value: f64, range: RangeInclusive<f64>, expected| {
         (option, value, range.contains(&value), expected)
     };
@@ -174,6 +178,7 @@ fn check_options(o: &IdentifyOptions) -> Result<(), IdentifyError> {
             lead_kg > 0.0 && lead_kg < 10.0,
             LEAD,
         ),
+        within("length_m", o.length_m.unwrap_or(1.0), 0.05..=5.0, TAPE),
         deviation("camera_position_std_m", o.camera_position_std_m),
         deviation("camera_look_at_std_m", o.camera_look_at_std_m),
         deviation("camera_roll_std_rad", o.camera_roll_std_rad),
@@ -202,7 +207,8 @@ mod tests {
     #[test]
     fn options_out_of_range_are_refused_by_name() {
         type Change = fn(&mut IdentifyOptions);
-        let cases: [(&str, Change); 14] = [
+        let cases: [(&str, Change); 15] = [
+            ("length_m", |o| o.length_m = Some(55.0)),
             ("population", |o| o.population = 3),
             ("population", |o| o.population = usize::MAX),
             ("generations", |o| o.generations = 0),

@@ -18,7 +18,7 @@ use rope_sim::AttachMotion;
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::rope::{Ambiguity, RANGES};
-use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
+use shared_types::{KeypointTrack, RopeEstimate, RopeParams, StereoCamera};
 use std::path::Path;
 
 /// Keypoints per frame when a video is given.
@@ -133,8 +133,23 @@ fn in_words(ambiguity: &Ambiguity) -> String {
     }
 }
 
+/// What a rope has beyond the nine parameters, in words.
+fn beyond_in_words(rope: &RopeParams) -> Option<String> {
+    let extras = rope.extras?;
+    let [x, y, _] = extras.rest_curvature_per_m;
+    let held = extras.friction.map_or(0.0, |f| f.moment_max_nm)
+        / (rope.joint_stiffness_nm_per_rad * rope.link_length_m()).max(1e-12);
+    let (curvature, clamp) = (x.hypot(y), extras.clamp_stiffness);
+    Some(format!(
+        "the film shows more than the nine parameters: a rest curvature of {curvature:.2} rad/m, friction that holds {held:.2} rad/m, a clamp {clamp:.1} times as stiff as a joint"
+    ))
+}
+
 /// What a person should know beside the numbers.
 fn print_remarks(estimate: &RopeEstimate) {
+    if let Some(beyond) = beyond_in_words(&estimate.params) {
+        println!("{beyond}");
+    }
     for ambiguity in &estimate.posterior.ambiguities {
         println!("{}", in_words(ambiguity));
     }
@@ -173,6 +188,7 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
         method,
         seed: args.seed,
         lead_mass_kg: args.lead_mass,
+        length_m: args.length,
         ..config.identify
     };
     let estimate = planner::identify(&observation, &options, net.as_ref(), &mut |p| {
