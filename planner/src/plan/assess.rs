@@ -1,5 +1,6 @@
 //! Whether a plan that keeps every limit is worth throwing.
 
+use super::plausible::far_outside;
 use shared_types::{Plan, Task};
 
 /// Predicted distances of tip and target above which a plan is reported to be poor, and
@@ -57,7 +58,8 @@ pub fn warnings(plan: &Plan) -> Vec<String> {
             f.failed, f.ropes
         )
     });
-    poor.into_iter().chain(interrupted).chain(failed).collect()
+    let first = poor.into_iter().chain(interrupted).chain(failed);
+    first.chain(far_outside(&plan.rope)).collect()
 }
 
 #[cfg(test)]

@@ -30,6 +30,16 @@ pub enum PlanError {
     /// The rope's parameters are not physical.
     #[error(transparent)]
     Rope(#[from] RopeError),
+    /// The arm does not carry the rope.
+    #[error(
+        "rope and tip weigh {mass_kg:.2} kg, but the arm carries {payload_kg} kg at most: check `lead_mass_kg` and `mass_per_length_kg_per_m`"
+    )]
+    Payload {
+        /// Mass of rope and tip (kg).
+        mass_kg: f64,
+        /// What the arm carries (kg).
+        payload_kg: f64,
+    },
     /// An option of the search is out of range.
     #[error("option {0}")]
     Option(#[from] OutOfRange),
@@ -67,6 +77,7 @@ impl PlanError {
             Self::Target(_)
                 | Self::Unreachable { .. }
                 | Self::Rope(_)
+                | Self::Payload { .. }
                 | Self::Follow(_)
                 | Self::Option(_)
         )

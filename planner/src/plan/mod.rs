@@ -9,6 +9,7 @@ mod error;
 mod finalists;
 mod lob;
 mod planning;
+mod plausible;
 mod pole_pose;
 mod polish;
 mod reach;

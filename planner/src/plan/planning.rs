@@ -1,6 +1,7 @@
 //! From a rope and a task to a throw: searches, polish, choice among the finalists.
 
 use super::finalists::{Finalist, best_first};
+use super::plausible::check_payload;
 use super::setup::{Count, Setup};
 use super::{PlanError, PlanRequest, ThrowOutcome, ThrowTask, check_reach, clear_of_arm};
 use arm_model::JointTrajectory;
@@ -33,6 +34,7 @@ pub fn plan_task(
 ) -> Result<Plan, PlanError> {
     let target_m = task.target_m();
     request.rope.validate()?;
+    check_payload(&request.rope)?;
     request.options.check()?;
     task.config().check()?;
     request.goal.check()?;

@@ -113,13 +113,14 @@ fn same_plan_for_one_two_and_four_threads() {
 #[test]
 fn impossible_requests_are_refused_before_any_simulation() {
     let good = [0.9, 0.0, 0.2];
-    for (target_m, length_m, said) in [
-        ([1.8, 0.3, 0.4], 0.5, "is out of reach"),
-        ([0.0, 0.0, 0.1], 0.5, "lies in the arm's base"),
-        (good, f64::NAN, "length"),
+    for (target_m, length_m, lead_kg, said) in [
+        ([1.8, 0.3, 0.4], 0.5, 0.05, "is out of reach"),
+        ([0.0, 0.0, 0.1], 0.5, 0.05, "lies in the arm's base"),
+        (good, f64::NAN, 0.05, "length"),
+        (good, 0.5, 6.0, "the arm carries 3.5 kg"),
     ] {
         let mut r = request(target_m);
-        r.rope.length_m = length_m;
+        (r.rope.length_m, r.rope.lead_mass_kg) = (length_m, lead_kg);
         let error = plan(&r, &mut |_| panic!("{target_m:?} was not refused")).unwrap_err();
         assert!(
             error.is_input() && error.to_string().contains(said),
