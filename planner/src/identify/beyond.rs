@@ -12,10 +12,13 @@ use super::coordinates::{
 };
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
+use super::noise::{Noise, RESIDUAL};
 use super::refine::{Refined, refine};
 
 /// Friction (1/m) and logarithm of its slip (1/m) at which the fit starts.
 const STARTS: [(f64, f64); 3] = [(0.02, -0.7), (0.3, -1.2), (0.5, 0.3)];
+/// Deviation of what a tracker's keypoint is off by all through a film (px).
+const OFFSET_STD_PX: f64 = 0.3;
 /// Least gain in cost (half of a sum of squared deviations). By chance the eight numbers
 /// gain four, more where the film's noise is not as estimated.
 const GAIN_MIN: f64 = 25.0;
@@ -41,18 +44,40 @@ pub(super) fn beyond(
     let found = refine(film, &coordinates, &starts, noise_px, budget)?;
     let cost = |fit: &Refined, x: &Point| {
         let normal = fit.at.normal(film, Fidelity::Fine, &found.noise);
-        normal.total_cost(&coordinates, x)
+        normal.total_cost(&coordinates, x) + counts_out_of_range(fit)
+            - offsets_gain(fit, film, &found.noise)
     };
     // A plain fit says nothing about a slip or a clamp that could be likely or not.
     let mut without = plain.x;
     for i in [SLIP, CLAMP] {
         without[i] = coordinates.prior_mean[i];
     }
-    let gain = cost(&plain, &without) + counts_out_of_range(&plain)
-        - cost(&found, &found.x)
-        - counts_out_of_range(&found);
+    let gain = cost(&plain, &without) - cost(&found, &found.x);
     tracing::debug!(gain, x = ?found.x.as_slice(), "fit beyond the nine parameters");
     Ok(if gain > GAIN_MIN { found } else { plain })
+}
+
+/// By how much the cost falls where every keypoint may be off by the same all through the
+/// film: a tracker's edge that is a little beside the rope's looks like a rope that curls.
+fn offsets_gain(fit: &Refined, film: &Film<'_>, noise: &Noise) -> f64 {
+    const OFFSET: usize = 0;
+    let grid = film.grid(Fidelity::Fine);
+    let mut rows = fit.at.rows.clone();
+    for axis in rows.iter_mut().flatten().flatten() {
+        axis[OFFSET] = 1.0;
+    }
+    noise.whiten(grid, &mut rows, OFFSET + 1);
+    let of_keypoint = |keypoint: usize, axis: usize| {
+        let mine = rows.iter().skip(keypoint).step_by(grid.keypoints).flatten();
+        let (pull, weight) = mine.fold((0.0, 0.0), |(pull, weight), row| {
+            let [offset, residual] = [row[axis][OFFSET], row[axis][RESIDUAL]];
+            (pull + offset * residual, weight + offset * offset)
+        });
+        0.5 * pull * pull / (weight + OFFSET_STD_PX.powi(-2))
+    };
+    (0..grid.keypoints)
+        .map(|keypoint| of_keypoint(keypoint, 0) + of_keypoint(keypoint, 1))
+        .sum()
 }
 
 /// What it costs a fit that its rope has a link count of the ranges: a continuous rope asks
