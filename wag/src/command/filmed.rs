@@ -13,6 +13,9 @@ use run_log::files::{self, JointsCsv};
 use shared_types::StereoCamera;
 use std::path::{Path, PathBuf};
 
+/// So much of a film may lie before or after what is told of the motion (s): the arm stands when
+/// a recording begins and ends.
+const UNTOLD_S: f64 = 0.5;
 const NO_MOTION: &str = "name the clamp's motion with --joints or --pose";
 
 /// How the clamp moved, on the film's clock: t = 0 is the first frame.
@@ -50,6 +53,26 @@ impl ClampMotion {
     /// The pole that carries the clamp, where its motion is that of joints.
     pub fn pole(&self) -> Option<&Pole> {
         self.joints.as_ref().map(|_| &self.pole)
+    }
+
+    /// Refuses a motion that tells of a part of the film only; before and after it the clamp
+    /// would be taken to stand still.
+    pub fn check_covers(&self, film_s: f64) -> anyhow::Result<()> {
+        let times_s: Vec<f64> = match &self.joints {
+            Some(csv) => csv.times_s.clone(),
+            None => files::read_pose(&self.path)?
+                .iter()
+                .map(|row| row.t_s)
+                .collect(),
+        };
+        let [first_s, last_s] = [times_s.first(), times_s.last()]
+            .map(|t_s| t_s.map_or(f64::NAN, |t_s| t_s + self.late_s));
+        ensure!(
+            first_s <= UNTOLD_S && last_s >= film_s - UNTOLD_S,
+            "`{}` tells the clamp's motion from {first_s:.2} to {last_s:.2} s, but the film lasts from 0 to {film_s:.2} s: record the motion for all of the film, or give its time with --film-late-ms",
+            self.path.display()
+        );
+        Ok(())
     }
 
     /// For tracker and simulator.
@@ -181,5 +204,41 @@ impl SceneArgs {
             anyhow!("name the camera's calibration and place (camera.toml) with --camera")
         })?;
         Ok(load_camera(file)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Poses from one time to another.
+    fn poses(folder: &Path, from_s: f64, to_s: f64) -> ClampMotion {
+        let mut text = "t,x,y,z,qw,qx,qy,qz\n".to_owned();
+        for i in 0..=100 {
+            let t_s = from_s + (to_s - from_s) * f64::from(i) / 100.0;
+            text.push_str(&format!("{t_s},0,0,1,1,0,0,0\n"));
+        }
+        let path = folder.join("pose.csv");
+        std::fs::write(&path, text).unwrap();
+        ClampMotion {
+            path,
+            joints: None,
+            pole: Pole::default(),
+            late_s: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_motion_told_for_a_part_of_the_film_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let check = |from_s, to_s| poses(folder.path(), from_s, to_s).check_covers(6.7);
+        assert!(check(0.0, 6.7).is_ok() && check(-1.0, 8.0).is_ok() && check(0.3, 6.4).is_ok());
+        for (from_s, to_s) in [(0.0, 0.2), (6.5, 6.7), (1.0, 8.0)] {
+            let refusal = check(from_s, to_s).unwrap_err().to_string();
+            assert!(
+                refusal.contains("pose.csv") && refusal.contains("6.70 s"),
+                "{refusal}"
+            );
+        }
     }
 }

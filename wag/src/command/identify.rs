@@ -51,6 +51,8 @@ fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
         let clamp = ClampMotion::read(&args.scene).or_input()?;
         let motion = clamp.attach().or_input()?;
         let track = read_keypoints(path).or_input()?;
+        let film_s = track.frames.last().map_or(0.0, |frame| frame.t_s);
+        clamp.check_covers(film_s).or_input()?;
         confirm(&track.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
         let warnings: Vec<_> = other_pole(&clamp, method).into_iter().collect();
         for warning in &warnings {

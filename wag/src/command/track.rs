@@ -10,8 +10,8 @@ use camera_ingest::{ImageFrame, TrackResult, track};
 use cli_output::{OrInput, Outcome, Stage};
 use run_log::files;
 use serde_json::{Value, json};
-use shared_types::KeypointTrack;
 use shared_types::keypoints::TrackedFrame;
+use shared_types::{KeypointTrack, MonotonicNs};
 use std::path::Path;
 
 /// Pictures in a contact sheet, and how many stand in a row.
@@ -28,6 +28,10 @@ pub fn track_video(
     let motion = filmed.motion.attach().or_input()?;
     stage.say("reading frames");
     let images = filmed.frames()?;
+    if let (Some(first), Some(last)) = (images.left.first(), images.left.last()) {
+        let film_s = MonotonicNs(last.stamp_ns).since_s(MonotonicNs(first.stamp_ns));
+        filmed.motion.check_covers(film_s).or_input()?;
+    }
     stage.say(format!("tracking through {} frames", images.left.len()));
     let explained = track(images.film(), &filmed.camera, &*motion, keypoints);
     let result = explained
