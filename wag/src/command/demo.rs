@@ -2,6 +2,7 @@
 //! bottom as the data flows.
 
 mod rope;
+mod settings;
 mod summary;
 
 use super::runs::explain_stop;
@@ -23,6 +24,7 @@ use rand_chacha::ChaCha8Rng;
 use rig_sim::RigConfig;
 use run_log::files;
 use serde_json::Value;
+use settings::settings;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
@@ -41,9 +43,6 @@ const MOVE_SPEED: f64 = 0.04;
 const WIGGLE_FRAMES: u32 = 400;
 /// Frames of a throw: two and a half seconds.
 const THROW_FRAMES: u32 = 150;
-/// How well the rig's camera is known to stand where its calibration says (m, and rad of
-/// roll): exactly, but for what its lens leaves over.
-const CAMERA_STD: f64 = 1e-3;
 /// Time after the last setpoint that still belongs to the throw (ns).
 const AFTER_THROW_NS: u64 = 600_000_000;
 /// Longest wait for the rope to hang still (s).
@@ -114,11 +113,7 @@ fn throw_once(
     rig: &RigConfig,
     accept_unconfirmed: bool,
 ) -> anyhow::Result<()> {
-    let mut settings = config::here::<PlannerConfig>(None)?;
-    settings.identify.seed = record.seed;
-    settings.identify.camera_position_std_m = CAMERA_STD;
-    settings.identify.camera_look_at_std_m = CAMERA_STD;
-    settings.identify.camera_roll_std_rad = CAMERA_STD;
+    let settings = settings(config::here(None)?, record.seed);
     let rig_config = pipeline::rig_config(folder, rig, record.seed, record.target_m);
     let mut demo = Demo::start(folder, session, record, settings, &rig_config)?;
     let motion = wiggle(&demo.settings.wiggle, &demo.limits)?;
