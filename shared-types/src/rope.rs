@@ -110,12 +110,7 @@ pub struct RopeError {
 
 impl RopeError {
     /// Refuses a value that is not from `min` to `max`.
-    pub(crate) fn unless_within(
-        key: &'static str,
-        value: f64,
-        min: f64,
-        max: f64,
-    ) -> Result<(), Self> {
+    fn unless_within(key: &'static str, value: f64, min: f64, max: f64) -> Result<(), Self> {
         let refusal = Self {
             key,
             value,
@@ -181,7 +176,10 @@ impl RopeParams {
         for ((value, (min, max)), range) in self.to_array().into_iter().zip(PHYSICAL).zip(RANGES) {
             RopeError::unless_within(range.key, value, min, max)?;
         }
-        self.beyond().validate()
+        for (key, value, min, max) in self.beyond().numbers() {
+            RopeError::unless_within(key, value, min, max)?;
+        }
+        Ok(())
     }
 
     /// Keys of parameters outside the trained ranges [`RANGES`].
@@ -216,6 +214,27 @@ impl RopeParams {
     #[must_use]
     pub fn lead_inertia_kg_m2(&self) -> f64 {
         0.4 * self.lead_mass_kg * self.lead_radius_m * self.lead_radius_m
+    }
+
+    /// The rope's physics beyond its nine parameters.
+    #[must_use]
+    pub fn beyond(&self) -> RopeExtras {
+        self.extras.unwrap_or(RopeExtras::NONE)
+    }
+
+    /// The same rope with other physics beyond its nine parameters.
+    #[must_use]
+    pub fn with_extras(self, extras: RopeExtras) -> Self {
+        let extras = (extras != RopeExtras::NONE).then_some(extras);
+        Self { extras, ..self }
+    }
+
+    /// Stiffness that dry friction adds to a joint until it slips (N m/rad).
+    #[must_use]
+    pub fn friction_stiffness_nm_per_rad(&self) -> f64 {
+        self.beyond().friction.map_or(0.0, |friction| {
+            friction.moment_max_nm / (friction.slip_curvature_per_m * self.link_length_m())
+        })
     }
 }
 
@@ -323,6 +342,7 @@ pub struct RopeEstimate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rope_extras::BendingFriction;
 
     #[test]
     fn array_form_keeps_every_field() {
@@ -342,5 +362,52 @@ mod tests {
                 assert_eq!(rope.validate().unwrap_err().key, range.key);
             }
         }
+    }
+
+    fn rope() -> RopeParams {
+        RopeParams::from_array([23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0])
+    }
+
+    #[test]
+    fn extras_are_checked_by_name_and_none_is_left_out() {
+        assert_eq!(rope().with_extras(RopeExtras::NONE), rope());
+        let slope = RopeExtras {
+            mass_slope: 1.0,
+            ..RopeExtras::NONE
+        };
+        let refusal = rope().with_extras(slope).validate().unwrap_err();
+        assert!(
+            refusal.to_string().contains("extras.mass_slope"),
+            "{refusal}"
+        );
+        let friction = BendingFriction {
+            moment_max_nm: f64::NAN,
+            slip_curvature_per_m: 0.5,
+        };
+        let extras = RopeExtras {
+            friction: Some(friction),
+            ..RopeExtras::NONE
+        };
+        assert!(rope().with_extras(extras).validate().is_err());
+    }
+
+    #[test]
+    fn a_rope_file_without_extras_reads_as_before_and_one_with_them_comes_back() {
+        let plain = toml::to_string(&rope()).unwrap();
+        assert!(!plain.contains("extras"));
+        assert_eq!(toml::from_str::<RopeParams>(&plain).unwrap(), rope());
+        let extras = RopeExtras {
+            rest_curvature_per_m: [0.3, -0.2, 0.0],
+            friction: Some(BendingFriction {
+                moment_max_nm: 0.002,
+                slip_curvature_per_m: 0.5,
+            }),
+            ..RopeExtras::NONE
+        };
+        let curled = rope().with_extras(extras);
+        let text = toml::to_string(&curled).unwrap();
+        assert_eq!(toml::from_str::<RopeParams>(&text).unwrap(), curled);
+        let bytes = postcard::to_allocvec(&curled).unwrap();
+        assert_eq!(postcard::from_bytes::<RopeParams>(&bytes).unwrap(), curled);
     }
 }

@@ -2,7 +2,6 @@
 //! mass that is uneven along it, dry friction in bending and a clamp of its own. Off by
 //! default.
 
-use crate::rope::{RopeError, RopeParams};
 use serde::{Deserialize, Serialize};
 
 /// Drag of still air on the links and the lead, quadratic in the speed.
@@ -78,8 +77,8 @@ impl RopeExtras {
         1.0 + self.mass_slope * (2.0 * place - 1.0)
     }
 
-    /// Refuses the first number that is not finite or not physical.
-    pub(crate) fn validate(&self) -> Result<(), RopeError> {
+    /// Every number with its key in `rope.toml`, least and greatest value.
+    pub(crate) fn numbers(&self) -> [(&'static str, f64, f64, f64); 11] {
         let drag = self.air_drag.map_or([0.0; 4], |drag| {
             [
                 drag.air_density_kg_m3,
@@ -110,88 +109,11 @@ impl RopeExtras {
                 1e3,
             ),
         ]
-        .into_iter()
-        .try_for_each(|(key, value, min, max)| RopeError::unless_within(key, value, min, max))
     }
 }
 
 impl Default for RopeExtras {
     fn default() -> Self {
         Self::NONE
-    }
-}
-
-impl RopeParams {
-    /// The rope's physics beyond its nine parameters.
-    #[must_use]
-    pub fn beyond(&self) -> RopeExtras {
-        self.extras.unwrap_or(RopeExtras::NONE)
-    }
-
-    /// The same rope with other physics beyond its nine parameters.
-    #[must_use]
-    pub fn with_extras(self, extras: RopeExtras) -> Self {
-        let extras = (extras != RopeExtras::NONE).then_some(extras);
-        Self { extras, ..self }
-    }
-
-    /// Stiffness that dry friction adds to a joint until it slips (N m/rad).
-    #[must_use]
-    pub fn friction_stiffness_nm_per_rad(&self) -> f64 {
-        self.beyond().friction.map_or(0.0, |friction| {
-            friction.moment_max_nm / (friction.slip_curvature_per_m * self.link_length_m())
-        })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn rope() -> RopeParams {
-        RopeParams::from_array([23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0])
-    }
-
-    #[test]
-    fn extras_are_checked_by_name_and_none_is_left_out() {
-        assert_eq!(rope().with_extras(RopeExtras::NONE), rope());
-        let slope = RopeExtras {
-            mass_slope: 1.0,
-            ..RopeExtras::NONE
-        };
-        let refusal = rope().with_extras(slope).validate().unwrap_err();
-        assert!(
-            refusal.to_string().contains("extras.mass_slope"),
-            "{refusal}"
-        );
-        let friction = BendingFriction {
-            moment_max_nm: f64::NAN,
-            slip_curvature_per_m: 0.5,
-        };
-        let extras = RopeExtras {
-            friction: Some(friction),
-            ..RopeExtras::NONE
-        };
-        assert!(rope().with_extras(extras).validate().is_err());
-    }
-
-    #[test]
-    fn a_rope_file_without_extras_reads_as_before_and_one_with_them_comes_back() {
-        let plain = toml::to_string(&rope()).unwrap();
-        assert!(!plain.contains("extras"));
-        assert_eq!(toml::from_str::<RopeParams>(&plain).unwrap(), rope());
-        let extras = RopeExtras {
-            rest_curvature_per_m: [0.3, -0.2, 0.0],
-            friction: Some(BendingFriction {
-                moment_max_nm: 0.002,
-                slip_curvature_per_m: 0.5,
-            }),
-            ..RopeExtras::NONE
-        };
-        let curled = rope().with_extras(extras);
-        let text = toml::to_string(&curled).unwrap();
-        assert_eq!(toml::from_str::<RopeParams>(&text).unwrap(), curled);
-        let bytes = postcard::to_allocvec(&curled).unwrap();
-        assert_eq!(postcard::from_bytes::<RopeParams>(&bytes).unwrap(), curled);
     }
 }

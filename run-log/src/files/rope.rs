@@ -99,12 +99,21 @@ pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate, doubts: &[Strin
 mod tests {
     use super::*;
     use shared_types::rope::{Ambiguity, FitCircumstances, OutOfDistribution};
+    use shared_types::{BendingFriction, RopeExtras};
 
     fn estimate() -> RopeEstimate {
         RopeEstimate {
             params: RopeParams::from_array([
                 23.0, 0.55, 0.006, 0.15, 0.0055, 0.05, 0.05, 0.02, 1.0,
-            ]),
+            ])
+            .with_extras(RopeExtras {
+                rest_curvature_per_m: [0.2, -0.3, 0.0],
+                friction: Some(BendingFriction {
+                    moment_max_nm: 0.002,
+                    slip_curvature_per_m: 0.5,
+                }),
+                ..RopeExtras::NONE
+            }),
             std_dev: std::array::from_fn(|i| (i == 1).then_some(0.001)),
             residual_px: 1.25,
             method: "cmaes".parse().unwrap(),
