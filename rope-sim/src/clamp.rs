@@ -1,7 +1,8 @@
 //! A first joint that is stiffer or softer than the others, one rope per lane.
 //!
 //! What it resists beyond any other joint rides on the first link as a load: `(f - 1)`
-//! times spring and damper, as implicit in the step as those of the other joints.
+//! times spring and damper, as implicit in the step as those of the other joints; its
+//! friction is scaled alike ([`crate::friction`]).
 
 use crate::algebra::Sym3;
 use crate::kernel::spring;

@@ -1,8 +1,8 @@
 //! Dry friction in bending: Dahl's model in every joint, one rope per lane.
 //!
 //! Over a step in which the joint turns at a constant rate the model has a closed form; its
-//! exponential is taken as a fraction that never lets the moment pass its limit, for any
-//! step. The joint's resistance to acceleration counts the friction's first stiffness
+//! exponential is taken as a fraction that falls to zero and never lets the moment pass its
+//! limit, for any step. The joint's resistance to acceleration counts the friction's first stiffness
 //! ([`crate::scheme::joint_resistance`]), which keeps the step stable.
 
 use crate::algebra::Vec3;
@@ -17,6 +17,8 @@ pub(crate) struct FrictionLanes<V> {
     stiffness: V,
     /// Inverse of the angle over which the moment comes up (1/rad).
     per_slip_angle: V,
+    /// The first joint's friction as a multiple of the others'.
+    clamp: V,
     joints: Vec<Joint<V>>,
 }
 
@@ -40,6 +42,7 @@ impl<V: Lanes> FrictionLanes<V> {
         Self {
             stiffness: zero,
             per_slip_angle: zero,
+            clamp: V::splat(1.0),
             joints: vec![at_rest; links],
         }
     }
@@ -53,6 +56,7 @@ impl<V: Lanes> FrictionLanes<V> {
         self.stiffness
             .set(lane, rope.friction_stiffness_nm_per_rad());
         self.per_slip_angle.set(lane, 1.0 / slip_angle_rad);
+        self.clamp.set(lane, rope.beyond().clamp_stiffness);
     }
 
     /// Notes how the joints turn at the start.
@@ -80,6 +84,9 @@ impl<V: Lanes> FrictionLanes<V> {
             *out = self.after(joint, link, link.w.sub(before), h);
             before = link.w;
         }
+        if let Some(first) = out.first_mut() {
+            *first = first.scale(self.clamp);
+        }
     }
 
     /// Takes over where the step has led to.
@@ -98,18 +105,16 @@ impl<V: Lanes> FrictionLanes<V> {
     fn after(&self, joint: &Joint<V>, link: &Link<V>, rate: Vec3<V>, h: V) -> Vec3<V> {
         let (one, half) = (V::splat(1.0), V::splat(0.5));
         let mean = rate.add(joint.rate).scale(half);
-        // Way over the slip angle; exp(-way) by its (2, 2) Padé approximant.
+        // Way over the slip angle; exp(-way) by its (0, 2) Padé approximant.
         let way = mean.norm() * h * self.per_slip_angle;
-        let even = way.fma(way * V::splat(1.0 / 12.0), one);
-        let per_denominator = way.fma(half, even).recip();
-        let kept = way.fnma(half, even) * per_denominator;
+        let kept = way.fma(way.fma(half, one), one).recip();
         // The moment turns with the link.
         let turn = link.w.scale(h);
         let turned = turn.cross_add(
             turn.cross_add(joint.moment.scale(half), joint.moment),
             joint.moment,
         );
-        let gained = mean.scale(h * self.stiffness * per_denominator);
+        let gained = mean.scale(h * self.stiffness * way.fma(half, one) * kept);
         turned.scale_add(kept, gained)
     }
 }

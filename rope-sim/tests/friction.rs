@@ -127,6 +127,41 @@ fn friction_calms_a_rope_and_holds_it_off_its_equilibrium() {
     assert!(middle.abs() > 5e-4, "{middle} m off");
 }
 
+/// A pendulum whose only joint is three times as stiff as its others would be.
+#[test]
+fn a_clamp_is_a_stiffer_first_joint() {
+    let soft = RopeParams {
+        joint_damping_nms_per_rad: 0.004,
+        joint_stiffness_nm_per_rad: 0.08,
+        ..pendulum().0
+    };
+    for clamp_stiffness in [3.0, 0.4] {
+        let clamped = soft.with_extras(RopeExtras {
+            clamp_stiffness,
+            friction: Some(FRICTION),
+            ..RopeExtras::NONE
+        });
+        let friction = BendingFriction {
+            moment_max_nm: clamp_stiffness * FRICTION.moment_max_nm,
+            ..FRICTION
+        };
+        let stiff = rubbing(
+            RopeParams {
+                joint_damping_nms_per_rad: clamp_stiffness * soft.joint_damping_nms_per_rad,
+                joint_stiffness_nm_per_rad: clamp_stiffness * soft.joint_stiffness_nm_per_rad,
+                ..soft
+            },
+            friction,
+        );
+        let options = released([0.0, 0.9, 0.0], options(Precision::F64, 1.0, 20.0));
+        let [a, b] = [clamped, stiff]
+            .map(|rope| angles_rad(&simulate(&Scene::EMPTY, &rope, &world, &options)));
+        for (a, b) in a.iter().zip(&b) {
+            assert!((a - b).abs() < 1e-9, "{a} against {b} rad");
+        }
+    }
+}
+
 /// A small swing of a pendulum: `angle cos(w t) + rate / w sin(w t)` in each plane.
 #[test]
 fn a_swing_goes_on_as_a_pendulum_does() {

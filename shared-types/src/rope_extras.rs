@@ -50,7 +50,7 @@ pub struct RopeExtras {
     /// end, from -0.95 to 0.95. Zero is an even rope. Sizes and the links' inertia about
     /// their centres stay.
     pub mass_slope: f64,
-    /// Stiffness and damping of the first joint, as a multiple of the others' (1). A rope
+    /// Stiffness, damping and friction of the first joint, as a multiple of the others' (1). A rope
     /// clamped rigidly bends along the half link on the clamp's far side only: about 2 in
     /// the limit of a continuous rope, less in a clamp that gives.
     pub clamp_stiffness: f64,

@@ -12,6 +12,7 @@ use super::coordinates::{
 };
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
+use super::linear::influence;
 use super::noise::{Noise, RESIDUAL};
 use super::refine::{Refined, refine};
 
@@ -19,8 +20,8 @@ use super::refine::{Refined, refine};
 const STARTS: [(f64, f64); 3] = [(0.02, -0.7), (0.3, -1.2), (0.5, 0.3)];
 /// Deviation of what a tracker's keypoint is off by all through a film (px).
 const OFFSET_STD_PX: f64 = 0.3;
-/// Least gain in cost (half of a sum of squared deviations). By chance the eight numbers
-/// gain four, more where the film's noise is not as estimated.
+/// Least gain in cost (half of a sum of squared deviations). By chance nine numbers
+/// gain four or five, more where the film's noise is not as estimated.
 const GAIN_MIN: f64 = 25.0;
 
 /// The fit with everything that a real rope may have, where the film shows it, else the
@@ -31,7 +32,7 @@ pub(super) fn beyond(
     plain: Refined,
     budget: &mut Budget<'_>,
 ) -> Result<Refined, IdentifyError> {
-    let coordinates = coordinates.beyond();
+    let coordinates = coordinates.beyond(film.sight());
     let start = |(friction, slip): (f64, f64)| {
         let mut x: Point = plain.x;
         (x[FRICTION], x[SLIP]) = (friction, slip);
@@ -44,21 +45,23 @@ pub(super) fn beyond(
     let found = refine(film, &coordinates, &starts, noise_px, budget)?;
     let cost = |fit: &Refined, x: &Point| {
         let normal = fit.at.normal(film, Fidelity::Fine, &found.noise);
-        normal.total_cost(&coordinates, x) + counts_out_of_range(fit)
-            - offsets_gain(fit, film, &found.noise)
+        normal.total_cost(&coordinates, x) - offsets_gain(fit, film, &found.noise)
+            + counts_out_of_range(fit, &found)
     };
     // A plain fit says nothing about a slip or a clamp that could be likely or not.
     let mut without = plain.x;
     for i in [SLIP, CLAMP] {
         without[i] = coordinates.prior_mean[i];
     }
-    let gain = cost(&plain, &without) - cost(&found, &found.x);
-    tracing::debug!(gain, x = ?found.x.as_slice(), "fit beyond the nine parameters");
+    // What the parts of the film disagree by is no evidence.
+    let gain = (cost(&plain, &without) - cost(&found, &found.x)) / found.inflation;
+    tracing::debug!(gain, inflation = found.inflation, x = ?found.x.as_slice(), "fit beyond the nine parameters");
     Ok(if gain > GAIN_MIN { found } else { plain })
 }
 
-/// By how much the cost falls where every keypoint may be off by the same all through the
-/// film: a tracker's edge that is a little beside the rope's looks like a rope that curls.
+/// By how much the cost falls where keypoints may be off by the same all through the film: a
+/// tracker's edge that is a little beside the rope's looks like a rope that curls. Offsets of
+/// neighbours are taken to be as alike as their noise.
 fn offsets_gain(fit: &Refined, film: &Film<'_>, noise: &Noise) -> f64 {
     const OFFSET: usize = 0;
     let grid = film.grid(Fidelity::Fine);
@@ -71,7 +74,11 @@ fn offsets_gain(fit: &Refined, film: &Film<'_>, noise: &Noise) -> f64 {
         let mine = rows.iter().skip(keypoint).step_by(grid.keypoints).flatten();
         let (pull, weight) = mine.fold((0.0, 0.0), |(pull, weight), row| {
             let [offset, residual] = [row[axis][OFFSET], row[axis][RESIDUAL]];
-            (pull + offset * residual, weight + offset * offset)
+            let counts = influence(row);
+            (
+                pull + counts * offset * residual,
+                weight + counts * offset * offset,
+            )
         });
         0.5 * pull * pull / (weight + OFFSET_STD_PX.powi(-2))
     };
@@ -80,10 +87,11 @@ fn offsets_gain(fit: &Refined, film: &Film<'_>, noise: &Noise) -> f64 {
         .sum()
 }
 
-/// What it costs a fit that its rope has a link count of the ranges: a continuous rope asks
-/// for more links, which the clamp's stiffness stands for.
-fn counts_out_of_range(fit: &Refined) -> f64 {
+/// What it costs a fit that its rope has a link count of the ranges, by what the fit with
+/// everything knows about the count: a continuous rope asks for more links, which the
+/// clamp's stiffness stands for.
+fn counts_out_of_range(fit: &Refined, found: &Refined) -> f64 {
     let (low, high) = link_range();
     let inside = fit.x[LINKS].clamp(f64::from(low), f64::from(high));
-    0.5 * (fit.x[LINKS] - inside).powi(2) / fit.covariance[(LINKS, LINKS)].max(1e-9)
+    0.5 * (fit.x[LINKS] - inside).powi(2) / found.covariance[(LINKS, LINKS)].max(1e-9)
 }

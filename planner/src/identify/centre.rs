@@ -2,10 +2,12 @@
 //! what can be.
 
 use super::clock::ClockWindow;
-use super::coordinates::{DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, Point, Reach, STIFFNESS};
+use super::coordinates::{
+    DAMPING, FRICTION, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, PLAIN, Point, Reach, STIFFNESS, SWAY,
+};
 use super::film::Film;
 use super::refine::Refined;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 /// Coordinates drawn, in this order.
 const DRAWN: [usize; 5] = [LENGTH, STIFFNESS, DAMPING, LEAD_MASS, LEAD_RADIUS];
@@ -50,6 +52,30 @@ impl Centre {
             lower: drawn(&bounds.lower),
             upper: drawn(&bounds.upper),
         }
+    }
+
+    /// The fit's point where its drawn coordinates and link count are moved to these, the
+    /// rope's extras along with them by their covariance.
+    pub(super) fn with_extras(fit: &Refined, drawn: &Vector, links: f64) -> Point {
+        const MOVED: [usize; 6] = [LENGTH, STIFFNESS, DAMPING, LEAD_MASS, LEAD_RADIUS, LINKS];
+        let between = |rows: &[usize], columns: &[usize]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
+                fit.covariance[(rows[i], columns[j])]
+            })
+        };
+        let extras: Vec<usize> = (PLAIN..SWAY).collect();
+        let to = |i: usize| if i < 5 { drawn[i] } else { links };
+        let shift = DVector::from_fn(MOVED.len(), |i, _| to(i) - fit.x[MOVED[i]]);
+        let mut x = fit.x;
+        let Some(factor) = between(&MOVED, &MOVED).cholesky() else {
+            return x;
+        };
+        let pull = between(&extras, &MOVED) * factor.solve(&shift);
+        for (i, pull) in extras.into_iter().zip(pull.iter()) {
+            x[i] += pull;
+        }
+        x[FRICTION] = x[FRICTION].max(0.0);
+        x
     }
 
     /// Where the fit is likeliest with this link count.

@@ -12,7 +12,7 @@
 use super::camera_pose::CORRECTIONS;
 use super::clock::ClockWindow;
 use crate::observation::Appearance;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rope_sim::Sway;
 use shared_types::rope::RANGES;
 use shared_types::{BendingFriction, RopeExtras, RopeParams};
@@ -96,6 +96,8 @@ pub(super) mod parameter {
 /// Mass per length of simulated ropes (kg/m): any would do, see the module; small, so
 /// that the stiffest ropes of a wide search stay within what the simulator accepts.
 const SIMULATED_MASS_PER_LENGTH: f64 = 0.01;
+/// Deviation of the rest curvature by which a rope bends along the line of sight (rad/m).
+const BEND_IN_SIGHT_STD_PER_M: f64 = 0.05;
 /// Deviation of a length measured by tape (m).
 const TAPE_STD_M: f64 = 2e-3;
 /// Radius of simulated ropes (m): too small to rule the link inertia.
@@ -121,6 +123,8 @@ pub(super) struct Coordinates {
     /// prior it is weak: their edges come in with [`super::posterior`].
     pub(super) prior_mean: Point,
     pub(super) prior_std: Point,
+    /// Inverse covariance of the rest curvature beyond that.
+    curvature_information: Matrix2<f64>,
 }
 
 /// Coordinates of a rope; clock and camera are 0.
@@ -151,6 +155,10 @@ pub(super) fn extras_of(x: &Point, bending_stiffness_nm2: f64) -> Option<RopeExt
         }),
         ..RopeExtras::NONE
     })
+}
+
+fn curvature_of(x: &Point) -> Vector2<f64> {
+    Vector2::new(x[CURVATURE], x[CURVATURE + 1])
 }
 
 /// How the rope swings at the film's begin.
@@ -242,6 +250,7 @@ impl Coordinates {
             upper: Point::zeros(),
             prior_mean: Point::zeros(),
             prior_std: Point::repeat(1.0),
+            curvature_information: Matrix2::zeros(),
         };
         for (i, (low, high)) in boxes.into_iter().enumerate() {
             out.lower[i] = low;
@@ -277,8 +286,10 @@ impl Coordinates {
     }
 
     /// The same with what real ropes have beyond the nine parameters, and a swing at the
-    /// film's begin. The priors are those of ropes that laboratories use.
-    pub(super) fn beyond(&self) -> Self {
+    /// film's begin. The priors are those of ropes that laboratories use. `sight` is the
+    /// camera's line of sight across the rope, in the attach frame: one eye cannot tell how
+    /// the rope bends along it from where the camera stands.
+    pub(super) fn beyond(&self, sight: Vector2<f64>) -> Self {
         // Smallest, likeliest, largest value, and the prior's deviation.
         const BEYOND: [(usize, [f64; 4]); FREE - PLAIN] = [
             (CURVATURE, [-4.0, 0.0, 4.0, 0.5]),
@@ -295,6 +306,9 @@ impl Coordinates {
         ];
         let mut out = self.clone();
         out.fitted = FREE;
+        // A rope bends along a direction by turning about the one across it.
+        let about = Vector2::new(-sight.y, sight.x) / BEND_IN_SIGHT_STD_PER_M;
+        out.curvature_information = about * about.transpose();
         for (i, [lower, mean, upper, std_dev]) in BEYOND {
             out.lower[i] = lower;
             out.upper[i] = upper;
@@ -311,19 +325,27 @@ impl Coordinates {
 
     /// Deviations of `x` from the prior's mean in its deviations, squared and summed.
     pub(super) fn prior_distance2(&self, x: &Point) -> f64 {
-        (x - self.prior_mean)
-            .component_div(&self.prior_std)
-            .norm_squared()
+        let curvature = curvature_of(x);
+        let distances = (x - self.prior_mean).component_div(&self.prior_std);
+        distances.norm_squared() + (self.curvature_information * curvature).dot(&curvature)
     }
 
     /// The same for one coordinate, over its deviation: the prior's gradient.
     pub(super) fn prior_gradient(&self, x: &Point) -> Point {
-        (x - self.prior_mean).component_div(&self.prior_std.component_mul(&self.prior_std))
+        let variances = self.prior_std.component_mul(&self.prior_std);
+        let mut gradient = (x - self.prior_mean).component_div(&variances);
+        let of_curvature = self.curvature_information * curvature_of(x);
+        gradient[CURVATURE] += of_curvature.x;
+        gradient[CURVATURE + 1] += of_curvature.y;
+        gradient
     }
 
     /// Inverse covariance of the prior.
     pub(super) fn prior_information(&self) -> Square {
-        Square::from_diagonal(&self.prior_std.map(|s| 1.0 / (s * s)))
+        let mut information = Square::from_diagonal(&self.prior_std.map(|s| 1.0 / (s * s)));
+        let mut of_curvature = information.fixed_view_mut::<2, 2>(CURVATURE, CURVATURE);
+        of_curvature += self.curvature_information;
+        information
     }
 }
 

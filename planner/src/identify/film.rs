@@ -6,7 +6,7 @@ use super::coordinates::{Coordinates, Reach};
 use super::error::IdentifyError;
 use super::options::IdentifyOptions;
 use crate::observation::{Observation, ObservedPoints};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use rope_sim::{
     Candidate, FrameTimes, NodeTrack, Outcome, Precision, Rollout, SimOptions, roll_out,
 };
@@ -161,6 +161,15 @@ impl<'a> Film<'a> {
         let camera_std = self.options.camera_std();
         let coordinates = Coordinates::new(seen, pixel_m, clock, &camera_std, reach);
         coordinates.measured(self.options.length_m)
+    }
+
+    /// The camera's line of sight across the rope when the film begins: the first two axes of
+    /// the attach frame; zero where it looks along the rope.
+    pub(super) fn sight(&self) -> Vector2<f64> {
+        let camera = self.observation.camera;
+        let attach = self.observation.motion.at(0.0).r;
+        let sight = attach.transpose() * camera.r_w_cam.column(2);
+        sight.xy().try_normalize(1e-3).unwrap_or_default()
     }
 
     /// How the filmed motion is simulated.

@@ -21,8 +21,8 @@ use shared_types::{RopeEstimate, RopeParams};
 use std::ops::ControlFlow;
 
 /// About how many steps a refinement takes, and a fast search with it.
-const REFINE_STEPS: usize = 12;
-const HYBRID_STEPS: usize = 30;
+const REFINE_STEPS: usize = 27;
+const HYBRID_STEPS: usize = 45;
 /// Method of an estimate whose rope looked like none of the ranges and was searched for
 /// again beyond them.
 pub const WIDE: &str = "hybrid-wide";

@@ -3,8 +3,8 @@
 
 use super::camera_pose::{CORRECTIONS, View};
 use super::coordinates::{
-    CAMERA, CLOCK, Coordinates, FREE, LINKS, Point, SIMULATED, SIMULATED_PLAIN, SWAY, Square,
-    link_range, simulated_rope, sway_of,
+    CAMERA, CLOCK, Coordinates, FREE, LINKS, PLAIN, Point, SIMULATED, SIMULATED_PLAIN, SWAY,
+    Square, link_range, simulated_rope, sway_of,
 };
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film, Grid, Instant, Sighting, is_finite, sample_s};
@@ -294,6 +294,11 @@ impl Comparison<'_> {
 }
 
 impl Linearised {
+    /// Whether the rope may have more than the nine parameters.
+    pub(super) fn is_beyond(&self) -> bool {
+        self.fitted > PLAIN
+    }
+
     /// Normal equations under a noise, without the prior.
     pub(super) fn normal(&self, film: &Film<'_>, fidelity: Fidelity, noise: &Noise) -> Normal {
         let grid: &Grid = film.grid(fidelity);
@@ -321,6 +326,12 @@ impl Linearised {
     }
 }
 
+/// Huber's weight of a whitened sighting.
+pub(super) fn influence(row: &[Row; 2]) -> f64 {
+    let distance = row[0][RESIDUAL].hypot(row[1][RESIDUAL]);
+    (HUBER / distance.max(1e-12)).min(1.0)
+}
+
 /// Weighted sum of the outer products of rows in the columns of the first `fitted`
 /// coordinates and the residual, and Huber's cost.
 fn accumulate(
@@ -331,7 +342,7 @@ fn accumulate(
     let mut cost = 0.0;
     for row in rows.iter().flatten() {
         let distance = row[0][RESIDUAL].hypot(row[1][RESIDUAL]);
-        let weight = (HUBER / distance.max(1e-12)).min(1.0);
+        let weight = influence(row);
         // Huber's loss is d² (2 - w) w / 2 with w the influence.
         cost += 0.5 * distance * distance * weight * (2.0 - weight);
         for axis in row {

@@ -8,7 +8,7 @@
 //! drawn ropes.
 
 use super::centre::{Centre, Vector};
-use super::coordinates::{LINKS, Point, extras_of, link_range, parameter};
+use super::coordinates::{LINKS, extras_of, link_range, parameter};
 use super::film::Film;
 use super::refine::Refined;
 use super::scale;
@@ -64,7 +64,7 @@ pub(super) fn posterior(fit: &Refined, film: &Film<'_>) -> (RopeParams, RopePost
         &draws,
         &posterior,
         film.options.lead_mass_kg,
-        (&centre, &fit.x),
+        (&centre, fit),
     );
     (params, posterior)
 }
@@ -267,7 +267,7 @@ fn likeliest(
     draws: &[Draw],
     posterior: &RopePosterior,
     lead_mass_kg: Option<f64>,
-    (centre, fitted): (&Centre, &Point),
+    (centre, fit): (&Centre, &Refined),
 ) -> RopeParams {
     let mean = |of: fn(&Draw) -> Vector| -> Vector { draws.iter().map(|d| of(d) * d.weight).sum() };
     let x = centre.near(mean(|d| d.coordinates), mean(|d| d.centre));
@@ -287,8 +287,13 @@ fn likeliest(
         x[4],
         posterior.mean[parameter::EXTRA_SCALE],
     ]);
+    let beyond = Centre::with_extras(fit, &x, links);
     RopeParams {
-        extras: extras_of(fitted, mu * x[1].exp()),
+        extras: fit
+            .at
+            .is_beyond()
+            .then(|| extras_of(&beyond, mu * x[1].exp()))
+            .flatten(),
         ..plain
     }
 }

@@ -96,6 +96,10 @@ impl Robustness {
             varied[0].length_m *= 1.0 + sign * self.length;
             varied[1].joint_stiffness_nm_per_rad *= 1.0 + sign * self.stiffness;
             varied[2].joint_damping_nms_per_rad *= 1.0 + sign * self.damping;
+            if let Some(friction) = varied[1].extras.as_mut().and_then(|e| e.friction.as_mut()) {
+                // Identified as a part of the stiffness.
+                friction.moment_max_nm *= 1.0 + sign * self.stiffness;
+            }
             varied[3].lead_mass_kg *= 1.0 + sign * self.lead_mass;
             out.extend(varied);
         }

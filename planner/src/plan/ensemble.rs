@@ -112,14 +112,17 @@ impl Logarithms {
         drawn.lead_mass_kg = value(6);
         drawn.lead_radius_m = value(7);
         drawn.link_extra_scale = value(8);
-        let drawn_plain = drawn;
+        let stiffer = drawn;
         if let Some(friction) = drawn.extras.as_mut().and_then(|e| e.friction.as_mut()) {
             // Identified as a part of the bending stiffness: a common factor is in both.
-            let wide = |rope: &RopeParams| rope.joint_stiffness_nm_per_rad * rope.link_length_m();
-            friction.moment_max_nm *= wide(&drawn_plain) / wide(rope);
+            friction.moment_max_nm *= bending_stiffness_nm2(&stiffer) / bending_stiffness_nm2(rope);
         }
         drawn
     }
+}
+
+fn bending_stiffness_nm2(rope: &RopeParams) -> f64 {
+    rope.joint_stiffness_nm_per_rad * rope.link_length_m()
 }
 
 /// The link count at a part of the cumulated probability.

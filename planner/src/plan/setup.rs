@@ -33,10 +33,12 @@ pub(super) struct Setup<'a> {
 /// (rad): what the tip of such a rope hangs aside, as seen from the base axis.
 const TURN_MAX_RAD: f64 = 0.3;
 
-/// Whether a rope at rest leaves the vertical plane of the throw.
+/// Whether a rope at rest leaves the vertical plane of the throw by more than a millimetre or
+/// so.
 fn curls(rope: &RopeParams) -> bool {
-    let mut curvature = rope.beyond().rest_curvature_per_m.into_iter();
-    curvature.any(|c| c.abs() > 0.0)
+    const CURVATURE_MIN_PER_M: f64 = 0.02;
+    let [x, y, _] = rope.beyond().rest_curvature_per_m;
+    x.hypot(y) > CURVATURE_MIN_PER_M
 }
 
 /// What was spent.

@@ -97,7 +97,12 @@ impl WaypointSpace {
     pub(super) fn bounds(&self, limits: &Limits) -> (Vec<f64>, Vec<f64>) {
         let most = self.stretch_max.ln();
         let of_joint = |j: usize| (limits.position_min_rad[j], limits.position_max_rad[j]);
-        let turn = (-self.turn_max_rad, self.turn_max_rad);
+        // Joint 1 keeps its range where the throw is turned.
+        let (low, high) = of_joint(0);
+        let turn = (
+            (low - self.start[0]).max(-self.turn_max_rad).min(0.0),
+            (high - self.start[0]).min(self.turn_max_rad).max(0.0),
+        );
         self.filled(of_joint, turn, (-most, most))
             .into_iter()
             .unzip()

@@ -67,7 +67,7 @@ pub enum PlannerEvent {
 pub struct PlannerRpc;
 
 impl Rpc for PlannerRpc {
-    const NAME: &'static str = "wag/v2/planner/control";
+    const NAME: &'static str = "wag/v3/planner/control";
     type Request = PlannerRequest;
     type Event = PlannerEvent;
     fn is_last(event: &PlannerEvent) -> bool {

@@ -56,6 +56,10 @@ pub(super) fn hanging(
             break;
         }
         let turns = chain.newton_turns(&links, &gradient);
+        // Rounding is all that is left: a start that was the solution.
+        if largest(&turns) < 1e-13 {
+            break;
+        }
         let mut part = (MAX_TURN_RAD / largest(&turns)).min(1.0);
         let next = loop {
             let next = turned(&links, &turns, part);

@@ -1,4 +1,5 @@
-//! `rope.toml`: nine parameters, with their uncertainty when they were identified.
+//! `rope.toml`: nine parameters and the rope's extras, with their uncertainty when they were
+//! identified.
 
 use super::atomic::write_atomic;
 use super::text::{located, read_text, read_toml};
@@ -10,7 +11,7 @@ use std::path::Path;
 /// Tables of an identified rope beside its parameters.
 const BESIDE: [&str; 4] = ["uncertainty", "interval_90", "fit", "posterior"];
 
-/// Reads the nine parameters; the tables of an identified rope are allowed and left
+/// Reads the nine parameters and the rope's `extras`; the tables of an identified rope are allowed and left
 /// alone, any other unknown key is refused.
 pub fn read_rope(path: &Path) -> Result<RopeParams> {
     let fail = || format!("rope file `{}`", path.display());
@@ -19,12 +20,16 @@ pub fn read_rope(path: &Path) -> Result<RopeParams> {
     for beside in BESIDE {
         table.remove(beside);
     }
-    let parameters = text.split("\n[").next().unwrap_or_default();
+    // The tables beside come behind the rope's own.
+    let end = BESIDE
+        .iter()
+        .filter_map(|beside| text.find(&format!("\n[{beside}")));
+    let parameters = &text[..end.min().unwrap_or(text.len())];
     let rope = table.try_into::<RopeParams>();
     let rope = rope.map_err(|refusal| located(refusal, toml::from_str::<RopeParams>(parameters)));
     let rope = rope.with_context(fail)?;
     rope.validate().with_context(fail)?;
-    Ok(rope)
+    Ok(rope.with_extras(rope.beyond()))
 }
 
 /// Reads what was left open when the rope was identified; `None` for a rope that was

@@ -392,7 +392,7 @@ pub enum RigEvent {
 pub struct RigRpc;
 
 impl Rpc for RigRpc {
-    const NAME: &'static str = "wag/v1/rig/control";
+    const NAME: &'static str = "wag/v2/rig/control";
     type Request = RigRequest;
     type Event = RigEvent;
     fn is_last(_event: &RigEvent) -> bool {
