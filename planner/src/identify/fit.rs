@@ -21,8 +21,8 @@ use shared_types::{RopeEstimate, RopeParams};
 use std::ops::ControlFlow;
 
 /// About how many steps a refinement takes, and a fast search with it.
-const REFINE_STEPS: usize = 27;
-const HYBRID_STEPS: usize = 45;
+const REFINE_STEPS: usize = 20;
+const HYBRID_STEPS: usize = 38;
 /// Method of an estimate whose rope looked like none of the ranges and was searched for
 /// again beyond them.
 pub const WIDE: &str = "hybrid-wide";
@@ -130,7 +130,7 @@ impl Fit<'_> {
             let from = from.map(|fit| (&fit.x, fit.at.distance_px));
             let (start, distance_px) = from.unwrap_or((start, distance_px));
             let noise_px = distance_px / 2.0_f64.sqrt();
-            refine(film, coordinates, &[*start], noise_px, budget)
+            refine(film, coordinates, start, noise_px, budget)
         })?;
         beyond(&self.film, coordinates, plain, &mut self.budget)
     }

@@ -16,11 +16,9 @@ use super::noise::Noise;
 /// the likeliest link count.
 const FIRST_STEPS: usize = 6;
 const SECOND_STEPS: usize = 5;
-/// Steps after which the best of several starts goes on alone.
-const CHOICE_STEPS: usize = 3;
 const LAST_STEPS: usize = 4;
 /// A cost lower by less than this is no better: a tenth of a deviation.
-const SETTLED: f64 = 5e-3;
+pub(super) const SETTLED: f64 = 5e-3;
 
 /// A refined fit.
 #[derive(Debug, Clone)]
@@ -36,11 +34,11 @@ pub(super) struct Refined {
     pub(super) inflation: f64,
 }
 
-/// Refines some starts, and what the likeliest of them leads to further.
+/// Refines the fit from a start.
 pub(super) fn refine(
     film: &Film<'_>,
     coordinates: &Coordinates,
-    starts: &[Point],
+    start: &Point,
     noise_px: f64,
     budget: &mut Budget<'_>,
 ) -> Result<Refined, IdentifyError> {
@@ -55,27 +53,9 @@ pub(super) fn refine(
         Noise::estimate(film.grid(Fidelity::Fine), &w.at.rows).at_least(film.options.noise_min_px)
     };
     let middle = middle_links();
-    let first = |iterations| rules(middle, Noise::white(noise_px), iterations);
-    let mut iterate = if let [_one] = starts {
-        best(descend(
-            film,
-            coordinates,
-            starts,
-            &[],
-            &first(FIRST_STEPS),
-            budget,
-        )?)?
-    } else {
-        let mut all = descend(film, coordinates, starts, &[], &first(CHOICE_STEPS), budget)?;
-        all.truncate(1);
-        best(go_on(
-            film,
-            coordinates,
-            all,
-            &first(FIRST_STEPS - CHOICE_STEPS),
-            budget,
-        )?)?
-    };
+    let first = rules(middle, Noise::white(noise_px), FIRST_STEPS);
+    let starts = [*start];
+    let mut iterate = best(descend(film, coordinates, &starts, &[], &first, budget)?)?;
     let second = rules(middle, estimate(&iterate), SECOND_STEPS);
     let again = Iterate::new(film, coordinates, &second, iterate.x, iterate.at);
     iterate = best(go_on(film, coordinates, vec![again], &second, budget)?)?;

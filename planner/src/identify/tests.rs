@@ -46,7 +46,7 @@ fn with_film<T>(rope: &RopeParams, look: impl FnOnce(&mut Film<'_>, &mut Budget<
 
 fn refined(film: &Film<'_>, reach: Reach, start: &Point, budget: &mut Budget<'_>) -> Refined {
     let coordinates = film.coordinates(film.clock_window(), reach);
-    refine(film, &coordinates, &[*start], 0.1, budget).unwrap()
+    refine(film, &coordinates, start, 0.1, budget).unwrap()
 }
 
 /// A fit from the rope's own parameters on: how far it ends from them, and in which steps (s).
