@@ -4,19 +4,11 @@ Reads one request from standard input, a JSON object, and writes one answer to s
 output. MuJoCo has the equations of motion; this file adds what it lacks. The request (SI units,
 quaternions scalar first):
 
-    rope            the nine parameters of a rope file
+    rope            the nine parameters of a rope file, and its table `extras` or null
     refinement      links for each link of the rope; bending stiffness and damping stay
-    channels        what else is true; each may be left out:
-      friction        {"moment_nm", "slip_curvature_rad_per_m"}: Dahl friction in bending, with
-                      its limit and the curvature over which it builds up
-      curvature_rad_per_m  [x, y]: rest curvature about two axes across the rope
-      drag            {"air_density_kg_m3", "normal", "tangential", "lead"}: coefficients
-      clamp_tilt_rad  [x, y]: the rope leaves the frame at this angle
-      clamp_stiffness factor on stiffness and damping of the first joint
-      mass_slope      mass per length goes from 1 - slope at the clamp to 1 + slope at the end
-      twist           factor on the stiffness about the rope's own axis
-      sway            {"angle_rad": [x, y], "rate_rad_s": [x, y]}: swing at the start, about the
-                      world's horizontal axes
+    clamp_tilt_rad  [x, y]: the rope leaves the frame at this angle
+    sway            {"angle_rad": [x, y], "rate_rad_s": [x, y]}: swing at the start, about the
+                    world's horizontal axes
     seed            of the shape from which the rope comes to rest before the start
     pose_period_s   time between two poses of the frame; also the step of the simulation
     poses           [x, y, z, qw, qx, qy, qz] of the frame; the rope leaves along its -z
@@ -80,7 +72,9 @@ class Rope:
     """Model, state and everything that acts on the rope beside MuJoCo's own forces."""
 
     def __init__(self, request):
-        rope, self.channels = request["rope"], request["channels"]
+        rope, self.sway = request["rope"], request["sway"]
+        self.tilt = exponential(across(request["clamp_tilt_rad"]))
+        extras = rope["extras"] or {}
         refinement = request["refinement"]
         self.links = rope["links"] * refinement
         self.s = rope["length_m"] / self.links
@@ -88,36 +82,38 @@ class Rope:
         mass = rope["mass_per_length_kg_per_m"] * self.s
         radius = max(rope["link_extra_scale"] * self.s / 2, rope["radius_m"])
         first = np.ones(self.links)
-        first[0] = self.channels.get("clamp_stiffness", 1.0)
+        first[0] = extras.get("clamp_stiffness", 1.0)
         self.k = refinement * rope["joint_stiffness_nm_per_rad"] * np.repeat(first, 3)
         self.c = refinement * rope["joint_damping_nms_per_rad"] * np.repeat(first, 3)
         self.model = mujoco.MjModel.from_xml_string(self.xml(
-            mass * (1 + self.channels.get("mass_slope", 0.0) * place), 0.4 * mass * radius**2,
+            mass * (1 + extras.get("mass_slope", 0.0) * place), 0.4 * mass * radius**2,
             rope["lead_mass_kg"], 0.4 * rope["lead_mass_kg"] * rope["lead_radius_m"] ** 2))
         self.data = mujoco.MjData(self.model)
         # Those of the step before.
         self.velocity = self.data.qvel.copy()
-        self.spring = exponential(self.s * across(self.channels.get("curvature_rad_per_m", (0, 0))))
-        self.model.qpos_spring[7:] = np.tile(self.spring, self.links)
-        self.twist = np.zeros(3 * self.links)
-        self.twist[2::3] = self.channels.get("twist", 1.0) - 1.0
+        curvature = np.array(extras.get("rest_curvature_per_m", (0.0, 0.0, 0.0)))
+        self.model.qpos_spring[7:] = np.tile(exponential(self.s * curvature), self.links)
         # Friction: its limit, its stiffness below that, and its moment now, joint by joint.
-        friction = self.channels.get("friction")
-        self.limit = friction["moment_nm"] if friction else 0.0
-        self.sigma = self.limit / (friction["slip_curvature_rad_per_m"] * self.s) if friction else 0.0
+        friction = extras.get("friction") or {"moment_max_nm": 0.0, "slip_curvature_per_m": 1.0}
+        self.slip_rad = friction["slip_curvature_per_m"] * self.s
+        self.limit = friction["moment_max_nm"] * first[:, None]
+        self.sigma = np.repeat(self.limit / self.slip_rad, 3)
+        self.rubs = friction["moment_max_nm"] > 0
         self.moment = np.zeros((self.links, 3))
-        drag = self.channels.get("drag")
+        drag = extras.get("air_drag")
+        self.drag = None
         if drag:
             thick, lead = 2 * rope["radius_m"] * self.s, np.pi * rope["lead_radius_m"] ** 2
             self.drag = [drag["air_density_kg_m3"] / 2 * x for x in (
-                drag["normal"] * thick, drag["tangential"] * thick, drag["lead"] * lead)]
+                drag["normal_coefficient"] * thick, drag["tangential_coefficient"] * thick,
+                drag["lead_coefficient"] * lead)]
 
     def xml(self, masses, inertia, lead_mass, lead_inertia):
         """Driven frame, ball-jointed links, lead; neither contacts nor constraints."""
         slides = "".join(
             f'<joint type="slide" axis="{axis}" armature="{ARMATURE!r}"/>'
             for axis in ("1 0 0", "0 1 0", "0 0 1"))
-        tilt = " ".join(repr(float(x)) for x in exponential(across(self.channels.get("clamp_tilt_rad", (0, 0)))))
+        tilt = " ".join(repr(float(x)) for x in self.tilt)
         bodies = "".join(
             f'<body pos="0 0 {0 if index == 0 else -self.s!r}" quat="{tilt if index == 0 else "1 0 0 0"}">'
             f'<joint type="ball" stiffness="{float(self.k[3 * index])!r}"/>'
@@ -142,7 +138,7 @@ class Rope:
         """
         self.step_s, self.damping = step_s, c
         self.model.opt.timestep = step_s
-        self.implicit = c / 2 + IMPLICIT * step_s * (self.k * (1 + self.twist) + self.sigma)
+        self.implicit = c / 2 + IMPLICIT * step_s * (self.k + self.sigma)
         self.model.dof_damping[BASE_DOFS:] = self.implicit
 
     def step(self, drive=0.0):
@@ -157,21 +153,18 @@ class Rope:
         force = data.qfrc_applied
         force[:BASE_DOFS] = ARMATURE * drive
         force[BASE_DOFS:] = self.implicit * now - self.damping * velocity[BASE_DOFS:]
-        if self.limit:
+        if self.rubs:
             force[BASE_DOFS:] -= self.moment.ravel()
-        if self.twist.any():
-            turn = logarithm(product(inverse(self.spring), data.qpos[7:].reshape(-1, 4)))
-            force[BASE_DOFS:] -= self.twist * self.k * turn.ravel()
-        if "drag" in self.channels:
+        if self.drag:
             data.xfrc_applied[2:, :3] = self.air()
         data.qvel[:] = velocity
         mujoco.mj_step2(self.model, data)
-        if self.limit:
+        if self.rubs:
             # Dahl: d moment/dt = sigma (w - |w| moment / limit), exactly for a constant w.
             w = data.qvel[BASE_DOFS:].reshape(-1, 3)
             speed = np.linalg.norm(w, axis=1, keepdims=True)
             slipping = self.limit * w / np.maximum(speed, 1e-12)
-            kept = np.exp(-self.sigma / self.limit * step_s * speed)
+            kept = np.exp(-step_s * speed / self.slip_rad)
             self.moment = slipping + (self.moment - slipping) * kept
 
     def air(self):
@@ -207,15 +200,14 @@ class Rope:
         # From the frame to a rope that hangs straight, without twist, then by hand.
         up = product(product(inverse(pose[3:]), np.array([0.0, 0.0, 0.0, 1.0])), pose[3:])
         hang = np.array([1 + up[3], -up[2], up[1], 0.0])
-        tilt = exponential(across(self.channels.get("clamp_tilt_rad", (0, 0))))
-        first = product(inverse(tilt), hang / np.linalg.norm(hang))
+        first = product(inverse(self.tilt), hang / np.linalg.norm(hang))
         swing = exponential(across(HANDLED_RAD * random.standard_normal(2)))
         data.qpos[7:11] = product(first, swing)
         bend = exponential(self.s * across(HANDLED_RAD_PER_M * random.standard_normal(2)))
         data.qpos[11:] = np.tile(bend, self.links - 1)
         self.rest()
-        sway = self.channels.get("sway")
-        if sway:
+        sway = self.sway
+        if any(sway["angle_rad"] + sway["rate_rad_s"]):
             hanging, moment = data.qpos.copy(), self.moment
             rate = np.linalg.norm(sway["rate_rad_s"])
             self.rest(np.array(sway["rate_rad_s"]) * (SHAPE_RAD / max(rate, 1e-12)))

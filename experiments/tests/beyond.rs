@@ -12,10 +12,6 @@ use rope_sim::{Candidate, PlannedArm, Precision, SimOptions, Watch, roll_out};
 use shared_types::{BendingFriction, RopeEstimate, RopeExtras, RopeParams};
 use std::ops::ControlFlow;
 
-fn bending_stiffness(rope: &RopeParams) -> f64 {
-    rope.joint_stiffness_nm_per_rad * rope.link_length_m()
-}
-
 fn identified(rope: &RopeParams, seed: u64) -> RopeEstimate {
     let motion = wiggling_arm(&WiggleConfig::default()).unwrap();
     let camera = side_camera();
@@ -66,7 +62,7 @@ fn friction_and_curvature_are_found_and_thrown_with() {
     for (index, direction_rad) in [(0_u64, 0.4_f64), (1, 2.5)] {
         let plain = trial_rope(41, index);
         let friction = BendingFriction {
-            moment_max_nm: 0.4 * bending_stiffness(&plain),
+            moment_max_nm: 0.4 * plain.bending_stiffness_nm2(),
             slip_curvature_per_m: 0.5,
         };
         let (sin, cos) = direction_rad.sin_cos();
@@ -79,7 +75,7 @@ fn friction_and_curvature_are_found_and_thrown_with() {
         let off_m = (found.length_m - rope.length_m).abs();
         assert!(off_m < 2.5e-3, "{found:?} against {rope:?}");
         let extras = found.extras.unwrap();
-        let held = extras.friction.unwrap().moment_max_nm / bending_stiffness(&found);
+        let held = extras.friction.unwrap().moment_max_nm / found.bending_stiffness_nm2();
         assert!((held - 0.4).abs() < 0.08, "{extras:?}");
         for axis in 0..2 {
             let curvature = extras.rest_curvature_per_m[axis];

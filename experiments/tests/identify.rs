@@ -47,7 +47,7 @@ fn quick(seed: u64, threads: usize) -> IdentifyOptions {
 fn per_mass(rope: &RopeParams) -> [f64; 3] {
     let mu = rope.mass_per_length_kg_per_m;
     [
-        rope.joint_stiffness_nm_per_rad * rope.link_length_m() / mu,
+        rope.bending_stiffness_nm2() / mu,
         rope.joint_damping_nms_per_rad * rope.link_length_m() / mu,
         rope.lead_mass_kg / mu,
     ]

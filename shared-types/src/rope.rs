@@ -197,6 +197,12 @@ impl RopeParams {
         self.length_m / f64::from(self.links)
     }
 
+    /// Bending stiffness `k s` (N m²).
+    #[must_use]
+    pub fn bending_stiffness_nm2(&self) -> f64 {
+        self.joint_stiffness_nm_per_rad * self.link_length_m()
+    }
+
     /// Mass of one link (kg).
     #[must_use]
     pub fn link_mass_kg(&self) -> f64 {

@@ -26,7 +26,7 @@ const PROMISE_MIN: f64 = 6.0;
 /// Deviation of what a tracker's keypoint is off by all through a film (px).
 const OFFSET_STD_PX: f64 = 0.3;
 /// Least gain in cost (half of a sum of squared deviations). By chance nine numbers
-/// gain four or five; a real tracker's errors on twenty films of plain ropes gained up to 42.
+/// gain four or five; a real tracker's errors on nine films of plain ropes gained up to 42.
 const GAIN_MIN: f64 = 50.0;
 
 /// The fit with everything that a real rope may have, where the film shows it, else the

@@ -115,14 +115,11 @@ impl Logarithms {
         let stiffer = drawn;
         if let Some(friction) = drawn.extras.as_mut().and_then(|e| e.friction.as_mut()) {
             // Identified as a part of the bending stiffness: a common factor is in both.
-            friction.moment_max_nm *= bending_stiffness_nm2(&stiffer) / bending_stiffness_nm2(rope);
+            friction.moment_max_nm *=
+                stiffer.bending_stiffness_nm2() / rope.bending_stiffness_nm2();
         }
         drawn
     }
-}
-
-fn bending_stiffness_nm2(rope: &RopeParams) -> f64 {
-    rope.joint_stiffness_nm_per_rad * rope.link_length_m()
 }
 
 /// The link count at a part of the cumulated probability.

@@ -139,8 +139,8 @@ fn in_words(ambiguity: &Ambiguity) -> String {
 fn beyond_in_words(rope: &RopeParams) -> Option<String> {
     let extras = rope.extras?;
     let [x, y, _] = extras.rest_curvature_per_m;
-    let held = extras.friction.map_or(0.0, |f| f.moment_max_nm)
-        / (rope.joint_stiffness_nm_per_rad * rope.link_length_m()).max(1e-12);
+    let held =
+        extras.friction.map_or(0.0, |f| f.moment_max_nm) / rope.bending_stiffness_nm2().max(1e-12);
     let (curvature, clamp) = (x.hypot(y), extras.clamp_stiffness);
     Some(format!(
         "the film shows more than the nine parameters: a rest curvature of {curvature:.2} rad/m, friction that holds {held:.2} rad/m, a clamp {clamp:.1} times as stiff as a joint"

@@ -174,7 +174,6 @@ mod tests {
     fn a_finer_cut_keeps_the_rope() {
         let rope = RopeParams::from_array([22.0, 0.55, 0.01, 0.2, 0.008, 0.06, 0.06, 0.03, 1.0]);
         let fine = cut_into(&rope, 44);
-        let bending = |r: &RopeParams| r.joint_stiffness_nm_per_rad * r.link_length_m();
-        assert!((bending(&fine) / bending(&rope) - 1.0).abs() < 1e-12);
+        assert!((fine.bending_stiffness_nm2() / rope.bending_stiffness_nm2() - 1.0).abs() < 1e-12);
     }
 }

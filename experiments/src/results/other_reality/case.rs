@@ -1,6 +1,6 @@
 //! What is drawn for one rope: the rope, how reality differs from the model, and by how much.
 
-use super::child::{Channels, Friction, OtherRope, Sway};
+use super::child::OtherRope;
 use crate::args::ChannelName;
 use arm_model::kinematics::FrameMotion;
 use arm_model::response::{Estimate, JointResponse, TrackingLag};
@@ -11,7 +11,8 @@ use planner::ropes::{random_strike_target, trial_rope};
 use planner::synthetic::FilmNoise;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
-use shared_types::{AirDrag, RopeParams};
+use rope_sim::Sway;
+use shared_types::{AirDrag, BendingFriction, RopeExtras, RopeParams};
 use std::f64::consts::TAU;
 
 /// Keeps these ropes apart from those of other studies.
@@ -91,9 +92,9 @@ impl Case {
         };
         let (curved, tilted, swung) = (direction(), direction(), direction());
         let camera = [direction(), direction(), direction()];
-        let friction = Friction {
-            moment_nm: uniform(0.02, 0.2) * bending_moment_nm(&params, uniform(0.1, 0.3)),
-            slip_curvature_rad_per_m: uniform(0.2, 1.5),
+        let friction = BendingFriction {
+            moment_max_nm: uniform(0.02, 0.2) * bending_moment_nm(&params, uniform(0.1, 0.3)),
+            slip_curvature_per_m: uniform(0.2, 1.5),
         };
         let curvature = curved * uniform(0.2, 0.6);
         let sway = {
@@ -127,20 +128,26 @@ impl Case {
         };
         let hangs = rng.random();
         let has = |one: ChannelName| channel == one || channel == ChannelName::All;
-        let optional = |one: ChannelName, pair: Vector2<f64>| -> [f64; 2] {
-            if has(one) { pair.into() } else { [0.0; 2] }
+        let optional =
+            |one: ChannelName, pair: Vector2<f64>| if has(one) { pair } else { Vector2::zeros() };
+        let curvature = optional(ChannelName::Curvature, curvature);
+        let extras = RopeExtras {
+            rest_curvature_per_m: [curvature.x, curvature.y, 0.0],
+            air_drag: has(ChannelName::Drag).then_some(air_drag),
+            friction: has(ChannelName::Friction).then_some(friction),
+            ..RopeExtras::NONE
         };
         let joints = has(ChannelName::Joints);
         Self {
             rope: OtherRope {
-                params,
+                params: params.with_extras(extras),
                 refinement,
-                channels: Channels {
-                    friction: has(ChannelName::Friction).then_some(friction),
-                    rest_curvature_per_m: optional(ChannelName::Curvature, curvature),
-                    air_drag: has(ChannelName::Drag).then_some(air_drag),
-                    clamp_tilt_rad: optional(ChannelName::ClampTilt, tilted * 1_f64.to_radians()),
-                    sway: has(ChannelName::Sway).then_some(sway),
+                clamp_tilt_rad: optional(ChannelName::ClampTilt, tilted * 1_f64.to_radians())
+                    .into(),
+                sway: if has(ChannelName::Sway) {
+                    sway
+                } else {
+                    Sway::NONE
                 },
             },
             target_m: random_strike_target(trial),
@@ -194,8 +201,7 @@ fn pendulum_rad_s(rope: &RopeParams) -> f64 {
 fn bending_moment_nm(rope: &RopeParams, angle_rad: f64) -> f64 {
     let rope_kg = rope.mass_per_length_kg_per_m * rope.length_m;
     let weight_n = 9.81 * (rope.lead_mass_kg + rope_kg);
-    let stiffness_nm2 = rope.joint_stiffness_nm_per_rad * rope.link_length_m();
-    angle_rad * (stiffness_nm2 * weight_n).sqrt()
+    angle_rad * (rope.bending_stiffness_nm2() * weight_n).sqrt()
 }
 
 /// A film whose camera stands 5 mm and looks half a degree off.
@@ -218,11 +224,12 @@ mod tests {
     fn a_channel_is_drawn_alike_alone_and_with_all() {
         let alone = |channel| Case::draw(1, 3, channel, 2);
         let all = alone(ChannelName::All);
-        let friction = |case: &Case| case.rope.channels.friction.map(|f| f.moment_nm);
+        let friction = |case: &Case| case.rope.params.beyond().friction;
         assert_eq!(friction(&alone(ChannelName::Friction)), friction(&all));
         assert_eq!(friction(&alone(ChannelName::Sway)), None);
         assert_eq!(alone(ChannelName::Camera).film, all.film);
-        assert_eq!(alone(ChannelName::None).rope.params, all.rope.params);
+        let plain = all.rope.params.with_extras(RopeExtras::NONE);
+        assert_eq!(alone(ChannelName::None).rope.params, plain);
         assert_eq!(alone(ChannelName::None).arm.zeros_rad.max_abs(), 0.0);
         assert_ne!(Case::draw(2, 3, ChannelName::All, 2).film, all.film);
     }

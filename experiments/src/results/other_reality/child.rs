@@ -4,9 +4,9 @@
 use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::kinematics::FrameMotion;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
-use rope_sim::FrameTimes;
+use rope_sim::{FrameTimes, Sway};
 use serde::{Deserialize, Serialize};
-use shared_types::{AirDrag, RopeParams};
+use shared_types::RopeParams;
 use std::ffi::OsString;
 use std::process::{Command, Stdio};
 
@@ -16,61 +16,16 @@ const SCRIPT: &str = include_str!("../../../other_reality/rope.py");
 /// Step of the simulation, and time between two poses of the attach frame (s).
 const STEP_S: f64 = 5e-4;
 
-/// Dahl friction in bending.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Friction {
-    /// Moment that it does not exceed (N m).
-    pub moment_nm: f64,
-    /// Curvature over which it builds up (rad/m).
-    pub slip_curvature_rad_per_m: f64,
-}
-
-/// A rope that swings at the start, about the world's x and y.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct Sway {
-    pub angle_rad: [f64; 2],
-    pub rate_rad_s: [f64; 2],
-}
-
-/// Drag of still air, named as the script has it.
-#[derive(Debug, Clone, Copy, Serialize)]
-struct Drag {
-    air_density_kg_m3: f64,
-    normal: f64,
-    tangential: f64,
-    lead: f64,
-}
-
-impl From<AirDrag> for Drag {
-    fn from(drag: AirDrag) -> Self {
-        Self {
-            air_density_kg_m3: drag.air_density_kg_m3,
-            normal: drag.normal_coefficient,
-            tangential: drag.tangential_coefficient,
-            lead: drag.lead_coefficient,
-        }
-    }
-}
-
-/// What is true of a rope beyond its nine parameters.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Channels {
-    pub friction: Option<Friction>,
-    /// About two axes across the rope (rad/m).
-    pub rest_curvature_per_m: [f64; 2],
-    pub air_drag: Option<AirDrag>,
-    /// About two axes across the rope (rad).
-    pub clamp_tilt_rad: [f64; 2],
-    pub sway: Option<Sway>,
-}
-
 /// A rope in MuJoCo.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OtherRope {
+    /// With its extras.
     pub params: RopeParams,
     /// Links for each of its links.
     pub refinement: u32,
-    pub channels: Channels,
+    /// How it leaves the clamp, about two axes across the rope (rad).
+    pub clamp_tilt_rad: [f64; 2],
+    pub sway: Sway,
 }
 
 /// A Python that has MuJoCo.
@@ -81,7 +36,8 @@ pub(super) struct Mujoco(OsString);
 struct Request<'a> {
     rope: &'a RopeParams,
     refinement: u32,
-    channels: serde_json::Value,
+    clamp_tilt_rad: [f64; 2],
+    sway: serde_json::Value,
     seed: u64,
     pose_period_s: f64,
     poses: Vec<[f64; 7]>,
@@ -92,25 +48,6 @@ struct Request<'a> {
 #[derive(Deserialize)]
 struct Answer {
     nodes_m: Vec<f64>,
-}
-
-impl Channels {
-    fn request(&self) -> serde_json::Value {
-        let mut channels = serde_json::json!({
-            "curvature_rad_per_m": self.rest_curvature_per_m,
-            "clamp_tilt_rad": self.clamp_tilt_rad,
-        });
-        if let Some(friction) = self.friction {
-            channels["friction"] = serde_json::json!(friction);
-        }
-        if let Some(drag) = self.air_drag {
-            channels["drag"] = serde_json::json!(Drag::from(drag));
-        }
-        if let Some(sway) = self.sway {
-            channels["sway"] = serde_json::json!(sway);
-        }
-        channels
-    }
 }
 
 impl Mujoco {
@@ -138,7 +75,11 @@ impl Mujoco {
         let request = Request {
             rope: &rope.params,
             refinement: rope.refinement,
-            channels: rope.channels.request(),
+            clamp_tilt_rad: rope.clamp_tilt_rad,
+            sway: serde_json::json!({
+                "angle_rad": rope.sway.angle_rad,
+                "rate_rad_s": rope.sway.rate_rad_s,
+            }),
             seed,
             pose_period_s: STEP_S,
             poses: (0..=steps)
@@ -203,7 +144,7 @@ mod tests {
     use planner::ropes::trial_rope;
     use planner::wiggle::{WiggleConfig, wiggling_arm};
     use rope_sim::{AttachMotion, Candidate, Precision, SimOptions, roll_out};
-    use shared_types::RopeExtras;
+    use shared_types::{AirDrag, BendingFriction, RopeExtras};
 
     /// The Python, or nothing where there is none: said aloud, and a failure in CI.
     fn mujoco() -> Option<Mujoco> {
@@ -221,7 +162,8 @@ mod tests {
         OtherRope {
             params,
             refinement,
-            channels: Channels::default(),
+            clamp_tilt_rad: [0.0; 2],
+            sway: Sway::NONE,
         }
     }
 
@@ -247,24 +189,18 @@ mod tests {
                 lead_coefficient: 0.5,
             }),
             rest_curvature_per_m: [0.3, -0.4, 0.0],
-            ..RopeExtras::NONE
+            mass_slope: 0.3,
+            clamp_stiffness: 1.8,
+            friction: None,
         };
         for (index, extras) in [(0, RopeExtras::NONE), (1, RopeExtras::NONE), (0, extras)] {
-            let rope = trial_rope(1, index);
-            let [x, y, _] = extras.rest_curvature_per_m;
-            let other = OtherRope {
-                channels: Channels {
-                    air_drag: extras.air_drag,
-                    rest_curvature_per_m: [x, y],
-                    ..Channels::default()
-                },
-                ..plain(rope, 1)
-            };
-            let rope = rope.with_extras(extras);
+            let rope = trial_rope(1, index).with_extras(extras);
             let candidate = Candidate::new(&rope, &arm);
             let ours = roll_out(&[candidate], &options).unwrap();
             let motion = |t_s| arm.at(t_s);
-            let theirs = mujoco.simulate(&other, motion, 1, &times, 2).unwrap();
+            let theirs = mujoco
+                .simulate(&plain(rope, 1), motion, 1, &times, 2)
+                .unwrap();
             let tip = rope.links as usize;
             for (frame, nodes) in theirs.chunks_exact(2).enumerate() {
                 let apart_m = (ours[0].nodes.position(frame, tip) - nodes[1]).norm();
@@ -282,18 +218,18 @@ mod tests {
             joint_damping_nms_per_rad: 5e-4,
             ..trial_rope(1, 0)
         };
-        let friction = Friction {
-            moment_nm: 0.5 * rope.joint_stiffness_nm_per_rad * rope.link_length_m(),
-            slip_curvature_rad_per_m: 0.3,
+        let friction = BendingFriction {
+            moment_max_nm: 0.5 * rope.bending_stiffness_nm2(),
+            slip_curvature_per_m: 0.3,
         };
         let tips_m = |friction, sway, seed, count| -> Vec<f64> {
+            let extras = RopeExtras {
+                friction,
+                ..RopeExtras::NONE
+            };
             let other = OtherRope {
-                channels: Channels {
-                    friction,
-                    sway,
-                    ..Channels::default()
-                },
-                ..plain(rope, 1)
+                sway,
+                ..plain(rope.with_extras(extras), 1)
             };
             let times = FrameTimes {
                 first_s: 0.0,
@@ -310,13 +246,13 @@ mod tests {
                 angle_rad: [0.1, 0.0],
                 rate_rad_s: [0.0, 0.0],
             };
-            let tips_m = tips_m(friction, Some(sway), 1, 400);
+            let tips_m = tips_m(friction, sway, 1, 400);
             let last = || tips_m[320..].iter().copied();
             last().fold(f64::MIN, f64::max) - last().fold(f64::MAX, f64::min)
         };
         let (free_m, held_m) = (last_swing_m(None), last_swing_m(Some(friction)));
         assert!(held_m < 0.6 * free_m, "{held_m} of {free_m} m");
-        let at_rest_m = |friction, seed| tips_m(friction, None, seed, 2)[0];
+        let at_rest_m = |friction, seed| tips_m(friction, Sway::NONE, seed, 2)[0];
         let (free_m, held_m) = (at_rest_m(None, 1), at_rest_m(Some(friction), 1));
         let elsewhere_m = at_rest_m(Some(friction), 2);
         assert!(free_m.abs() < 1e-5, "{free_m} m");

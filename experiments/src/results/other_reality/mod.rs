@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 use planner::identify::IdentifyOptions;
 use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, simulator_for};
 use planner::synthetic::{FilmTiming, Filmed, RopeFilm, project};
-use rope_sim::{FrameTimes, PlannedArm};
+use rope_sim::{FrameTimes, PlannedArm, Sway};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use shared_types::{ErrorForecast, Plan, RopeEstimate, Task};
@@ -199,7 +199,7 @@ impl Study<'_> {
         };
         let mut rope = case.rope;
         // It was left to come to rest.
-        rope.channels.sway = None;
+        rope.sway = Sway::NONE;
         let motion = |t_s| case.arm.attach_frame(&reported, t_s);
         // And hangs in another of the shapes that friction holds.
         let seed = case.seed.wrapping_add(1);
