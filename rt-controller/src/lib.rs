@@ -37,6 +37,7 @@ pub mod report_stream;
 pub mod rt_loop;
 pub mod session;
 pub mod set_up;
+pub mod stopping;
 pub mod transport;
 pub mod warm_up;
 mod watchdog;

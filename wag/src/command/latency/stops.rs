@@ -12,62 +12,26 @@ use crate::pipeline::{self, ArmLink, BringUp};
 use crate::session::Session;
 use anyhow::{Context, bail, ensure};
 use arm_model::joint::START_POSE;
-use arm_model::kinematics::tool_speed_m_s;
 use arm_model::{JointTrajectory, Limits, Pole};
 use cli_output::{OrInput, Outcome, Stage, table};
 use rt_controller::armed_speed::ArmedSpeed;
-use rt_controller::control::{Motion, OperatingModeSpeeds};
+use rt_controller::control::OperatingModeSpeeds;
 use rt_controller::os::now_ns;
 use rt_controller::session::ArmSession;
+use rt_controller::stopping::{StopMethod, Stopping, fastest_swing};
 use serde_json::{Value, json};
-use shared_types::ipc::JointReport;
+use shared_types::OperatingMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
-use shared_types::{FaultCode, OperatingMode};
 use std::net::SocketAddr;
 use std::time::Duration;
 
-/// How far joint 1 would turn (rad); it is stopped half way.
-const SWING_RAD: f64 = 0.9;
-/// Waypoints of the swing.
-const WAYPOINTS: usize = 13;
-/// Longest and shortest swing that is tried (s).
-const LASTS_S: [f64; 2] = [0.4, 12.0];
-/// A joint that is slower stands still (rad/s).
-const STILL_RAD_S: f64 = 1e-2;
 /// How long the joints are watched after a stop.
 const WATCHED: Duration = Duration::from_millis(1500);
 /// How the arm is before it returns for the next swing.
 const STOPPED: &str = "The arm was stopped; it will be enabled and returns to the start.";
 /// Longest wait for an answer of the arm.
 const ANSWERED: Duration = Duration::from_secs(1);
-
-/// How the arm is stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
-    Brake,
-    State4,
-}
-
-impl Way {
-    /// Whether a motion that ended so was stopped in this way, and not by something that nobody
-    /// asked for.
-    fn is_met_by(self, end: &ControllerEvent) -> bool {
-        match end {
-            ControllerEvent::Stopped {
-                fault,
-                arm_error: 0,
-                ..
-            } => match self {
-                Self::Brake => *fault == FaultCode::OperatorStop,
-                Self::State4 => {
-                    matches!(fault, FaultCode::ArmNotReady | FaultCode::ArmModeChanged)
-                }
-            },
-            _ => false,
-        }
-    }
-}
 
 /// One stop.
 #[derive(Debug, serde::Serialize)]
@@ -85,31 +49,13 @@ struct Stopped {
 
 /// The fastest swing that is allowed.
 fn swing(mode: OperatingMode, limits: &Limits, pole: &Pole) -> anyhow::Result<JointTrajectory> {
-    let speed = ArmedSpeed {
+    let swing = fastest_swing(&ArmedSpeed {
         armed: mode,
         limits,
         pole,
         speeds: OperatingModeSpeeds::default(),
-    };
-    let lasting = |duration_s: f64| {
-        let at = |k: usize| {
-            let part = k as f64 / (WAYPOINTS - 1) as f64;
-            let mut q = START_POSE;
-            // Speed and acceleration are zero at both ends.
-            q[0] += SWING_RAD * part.powi(3) * (part * (6.0 * part - 15.0) + 10.0);
-            (duration_s * part, q)
-        };
-        let (times_s, poses): (Vec<_>, Vec<_>) = (0..WAYPOINTS).map(at).unzip();
-        let swing = JointTrajectory::new(&times_s, &poses).ok()?;
-        let kept = limits.worst_violation(&swing).is_none();
-        (kept && speed.check(&Motion::Spline(swing)).is_ok()).then_some(swing)
-    };
-    let [shortest_s, longest_s] = LASTS_S;
-    let durations = (0..).map(|k| shortest_s * 1.05_f64.powi(k));
-    let mut durations = durations.take_while(|s| *s <= longest_s);
-    durations.find_map(lasting).with_context(|| {
-        format!("joint 1 cannot swing {SWING_RAD} rad from the start pose within the limits")
-    })
+    });
+    swing.context("joint 1 cannot swing from the start pose within the limits")
 }
 
 /// Swings and stops once, of an arm that stands in the start pose and is armed.
@@ -119,7 +65,7 @@ fn stop(
     arm: SocketAddr,
     pole: &Pole,
     swing: &JointTrajectory,
-    (mode, way): (OperatingMode, Way),
+    (mode, method): (OperatingMode, StopMethod),
 ) -> anyhow::Result<Stopped> {
     let mut line = ArmSession::connect(arm, ANSWERED)?;
     line.keep_heartbeat();
@@ -141,12 +87,12 @@ fn stop(
         std::thread::sleep(Duration::from_millis(1));
     }
     let told_ns = now_ns();
-    let by = match way {
-        Way::Brake => {
+    let by = match method {
+        StopMethod::Brake => {
             session.ask(link, &ControllerRequest::Stop, 5.0, |_| ())?;
             "controller's brake"
         }
-        Way::State4 => {
+        StopMethod::State4 => {
             let taken = line.stop_arm()?;
             ensure!(
                 taken,
@@ -159,29 +105,18 @@ fn stop(
     session.end_hold();
     let end = end?;
     ensure!(
-        way.is_met_by(&end),
+        method.has_caused(&end),
         "something else stopped the swing: {end:?}"
     );
     session.idle(WATCHED)?;
     let reports = session.received.cycles.reports();
-    let before = reports.iter().rev().find(|r| r.stamp_ns <= told_ns);
-    let before = *before.context("the arm reported no joints before it was stopped")?;
-    let after = reports.into_iter().filter(|r| r.stamp_ns > told_ns);
-    let after: Vec<JointReport> = after.collect();
-    let moves = |r: &JointReport| r.qd.max_abs() > STILL_RAD_S;
-    let moving = after.iter().rposition(moves).map_or(0, |last| last + 1);
-    let rest = after.get(moving).context("the arm did not come to rest")?;
-    let ends_m = core::iter::once(&before).chain(&after[..=moving]);
-    let ends_m: Vec<_> = ends_m.map(|r| pole.attach_pose(&r.q).0).collect();
+    let stopping = Stopping::measured(&reports, told_ns, pole).map_err(anyhow::Error::msg)?;
     Ok(Stopped {
         operating_mode: mode,
         by,
-        speed_m_s: tool_speed_m_s(&before.q, &before.qd, &pole.end_m()),
-        time_s: 1e-9 * (rest.stamp_ns - told_ns) as f64,
-        distance_m: ends_m
-            .windows(2)
-            .map(|pair| (pair[1] - pair[0]).norm())
-            .sum(),
+        speed_m_s: stopping.speed_m_s,
+        time_s: stopping.time_s,
+        distance_m: stopping.distance_m,
     })
 }
 
@@ -204,7 +139,7 @@ pub(super) fn measure(args: &LatencyArgs) -> Outcome<Value> {
     let work = |session: &mut Session, link: &ArmLink| {
         let mut stops = Vec::new();
         for (mode, swing) in &swings {
-            for way in [Way::Brake, Way::State4] {
+            for method in [StopMethod::Brake, StopMethod::State4] {
                 if !stops.is_empty() {
                     // Who looked at the arm acknowledges the stop.
                     is_asked
@@ -220,7 +155,7 @@ pub(super) fn measure(args: &LatencyArgs) -> Outcome<Value> {
                 session.await_hold()?;
                 let stage = Stage::begin("stop");
                 pipeline::arm_for(session, link, *mode, Some(word.unwrap_or_else(now_ns)))?;
-                let stopped = stop(session, link, arm, &pole, swing, (*mode, way))?;
+                let stopped = stop(session, link, arm, &pole, swing, (*mode, method))?;
                 stage.done(&format!(
                     "{:?}, by the {}: {:.2} m/s to rest in {:.0} ms and {:.0} mm",
                     mode,
@@ -266,32 +201,4 @@ fn show(stops: &[Stopped]) {
         "stopped by",
     ];
     println!("{}", table::numbers(header, 1, rows));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_the_stop_that_was_asked_for_is_measured() {
-        let ended = |fault, arm_error| ControllerEvent::Stopped {
-            fault,
-            cycle: 1,
-            arm_error,
-            message: String::new(),
-        };
-        let met = |end: &ControllerEvent| [Way::Brake, Way::State4].map(|way| way.is_met_by(end));
-        assert_eq!(met(&ended(FaultCode::OperatorStop, 0)), [true, false]);
-        assert_eq!(met(&ended(FaultCode::ArmModeChanged, 0)), [false, true]);
-        assert_eq!(met(&ended(FaultCode::ArmNotReady, 0)), [false, true]);
-        for end in [
-            ended(FaultCode::DeadManReleased, 0),
-            ended(FaultCode::JointStuck, 0),
-            ended(FaultCode::OperatorStop, 31),
-            ended(FaultCode::ArmNotReady, 31),
-            ControllerEvent::Done,
-        ] {
-            assert_eq!(met(&end), [false, false], "{end:?}");
-        }
-    }
 }
