@@ -26,9 +26,12 @@ fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
                 "joint {joint}: {text}"
             );
             let error = Errors::of(found.lag()?, &secrets[joint - 1]);
-            // Two cycles and a quarter: a shared machine's wake-ups blur the measurement itself.
+            // A shared machine's wake-ups blur the measurement by up to two cycles. An overdamped
+            // joint's two poles and its dead time then trade against each other; how late it is
+            // in slow motion and where its amplitude falls they leave alone.
+            let follows = error.slow_delay_s < 6e-3 && error.bandwidth < 0.25;
             assert!(
-                error.are_below(8e-3, 0.25),
+                error.dead_time_s < 8e-3 && follows,
                 "joint {joint}: {error:?}\n{text}"
             );
             Some(error)

@@ -27,6 +27,8 @@ fn secret_lags(rng: &mut ChaCha8Rng) -> [JointLag; JOINTS] {
 #[derive(Debug, Clone, Copy)]
 struct Errors {
     dead_time_s: f64,
+    /// Of the delay in slow motion, dead time and lag together.
+    slow_delay_s: f64,
     /// Of the -3 dB bandwidth, as a part of it.
     bandwidth: f64,
     /// Of the natural frequency, as a part of it.
@@ -49,6 +51,7 @@ impl Errors {
         let part = |found: f64, true_: f64| (found / true_ - 1.0).abs();
         Self {
             dead_time_s: (found.dead_time_s.value - secret.dead_time_s).abs(),
+            slow_delay_s: (found.slow_delay_s() - truth.slow_delay_s()).abs(),
             bandwidth: part(found.bandwidth_hz(), truth.bandwidth_hz()),
             natural_frequency: part(
                 found.natural_frequency_hz.value,
@@ -76,6 +79,7 @@ fn report(name: &str, all: &[Errors]) {
         );
     };
     line("dead time (ms)", 1e3, |e| e.dead_time_s);
+    line("slow delay (ms)", 1e3, |e| e.slow_delay_s);
     line("bandwidth (%)", 1e2, |e| e.bandwidth);
     line("natural frequency (%)", 1e2, |e| e.natural_frequency);
     line("damping ratio", 1.0, |e| e.damping_ratio);
