@@ -51,8 +51,8 @@ impl SimulatedArm {
         let command = listen(config.bind, config.command_port)?;
         let mut numbers = [command.local_addr()?.port(), 0, 0, 0, 0];
         let mut sockets = vec![(command, Service::Commands)];
-        let wishes = config.report_ports.into_iter().zip(ReportKind::ALL);
-        for ((port, kind), number) in wishes.zip(&mut numbers[1..]) {
+        let requests = config.report_ports.into_iter().zip(ReportKind::ALL);
+        for ((port, kind), number) in requests.zip(&mut numbers[1..]) {
             let listener = listen(config.bind, port)?;
             *number = listener.local_addr()?.port();
             if kind.len(config.firmware).is_some() {

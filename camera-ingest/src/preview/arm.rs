@@ -18,7 +18,7 @@ const MOVED_RAD: f64 = 0.01;
 /// No joint is that fast (rad/s).
 const TOO_FAST_RAD_S: f64 = 10.0;
 /// Most reports kept: more than two minutes.
-const MOST: usize = 1 << 15;
+const MAX_REPORTS: usize = 1 << 15;
 
 /// Measured joints (CLOCK_MONOTONIC, ns).
 #[derive(Debug, Clone, Copy)]
@@ -74,7 +74,7 @@ impl Arm {
         }
         self.reports.push_back(new);
         // Whoever needs the past asks before it is full.
-        while self.reports.len() > MOST {
+        while self.reports.len() > MAX_REPORTS {
             self.reports.pop_front();
         }
     }
@@ -102,7 +102,7 @@ impl Arm {
 
     /// Whether the oldest reports are about to be forgotten.
     pub(super) fn is_full(&self) -> bool {
-        self.reports.len() >= MOST
+        self.reports.len() >= MAX_REPORTS
     }
 
     /// Farthest that any joint has been from where it was at the oldest report (rad).
@@ -158,7 +158,7 @@ mod tests {
             arm.put((1 + 4 * k) * MS, at(0.2 * (0.004 * k as f64).sin()));
         }
         assert!(arm.stands_since_ns() > Some(159_900 * MS));
-        assert!(arm.is_full() && arm.reports.len() == MOST);
+        assert!(arm.is_full() && arm.reports.len() == MAX_REPORTS);
         assert!((0.2..0.41).contains(&arm.reach_rad()));
         arm.forget_before(159_000 * MS);
         let motion = arm.motion(159_000 * MS).unwrap();

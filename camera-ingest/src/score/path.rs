@@ -31,8 +31,8 @@ impl Sighting {
     /// its radius, where a clear one's is off by a tenth of a pixel or two.
     pub(super) fn cut(&mut self) {
         /// A small blob's centre is no better known when it is cut.
-        const LEAST: f64 = 3.0;
-        self.doubt = self.radius_px.max(LEAST);
+        const MIN_PX: f64 = 3.0;
+        self.doubt = self.radius_px.max(MIN_PX);
     }
 }
 
@@ -254,7 +254,7 @@ fn fit(points: &[Point], degree: usize, min_scale: f64, min_error: f64) -> Optio
 mod tests {
     use super::*;
 
-    const LEAST: PathError = PathError {
+    const MIN_ERROR: PathError = PathError {
         across: 5e-4,
         inverse_depth: 3e-3,
     };
@@ -284,14 +284,14 @@ mod tests {
         };
         let mut sightings = clear(truth);
         sightings[6].inverse_depth += 0.08;
-        let path = LocalPath::around(&sightings, 7, LEAST).unwrap();
+        let path = LocalPath::around(&sightings, 7, MIN_ERROR).unwrap();
         let ([x, y], w) = truth(0.12);
         let p = path.at(0.12);
         assert!(
             (p - Vector3::new(x / w, y / w, 1.0 / w)).norm() < 0.004,
             "{p}"
         );
-        assert!(LocalPath::around(&sightings[..3], 1, LEAST).is_none());
+        assert!(LocalPath::around(&sightings[..3], 1, MIN_ERROR).is_none());
     }
 
     #[test]
@@ -304,13 +304,13 @@ mod tests {
             sighting.area_m2 /= 2.0;
         }
         let t_s = 7.0 / 60.0;
-        let whole = LocalPath::around(&clear, 7, LEAST).unwrap();
-        let misled = LocalPath::around(&half, 7, LEAST).unwrap();
+        let whole = LocalPath::around(&clear, 7, MIN_ERROR).unwrap();
+        let misled = LocalPath::around(&half, 7, MIN_ERROR).unwrap();
         assert!((misled.at(t_s) - whole.at(t_s)).norm() > 0.02);
         mark_small(&mut half);
         let cut: Vec<usize> = (0..15).filter(|&i| half[i].doubt > 1.0).collect();
         assert_eq!(cut, [6, 7, 8]);
-        let bridged = LocalPath::around(&half, 7, LEAST).unwrap();
+        let bridged = LocalPath::around(&half, 7, MIN_ERROR).unwrap();
         let off_m = (bridged.at(t_s) - whole.at(t_s)).norm();
         assert!(off_m < 0.006, "{off_m} m");
         let (sure, unsure) = (whole.error_at(t_s), bridged.error_at(t_s));

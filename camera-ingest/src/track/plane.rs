@@ -13,10 +13,10 @@ use shared_types::{Intrinsics, StereoCamera};
 pub(super) type Point = [f64; 2];
 
 /// Ways of the clamp shorter than this say nothing about the plane (m, std).
-const LEAST_SPREAD_M: f64 = 0.005;
+const MIN_SPREAD_M: f64 = 0.005;
 /// A plane seen flatter than this is of no use (cosine of the angle between
 /// the camera's view and the plane's normal).
-const LEAST_FACING: f64 = 0.35;
+const MIN_FACING: f64 = 0.35;
 
 /// Map from raw left-eye pixels to the plane (m).
 #[derive(Debug, Clone)]
@@ -44,7 +44,7 @@ impl RopePlane {
         let facing = camera.r_w_cam.column(0).into_owned();
         let right_w = main_direction(clamp, until_s)
             .map(|d| if d.dot(&facing) < 0.0 { -d } else { d })
-            .filter(|d| d.cross(&Vector3::z()).dot(&view_w).abs() > LEAST_FACING)
+            .filter(|d| d.cross(&Vector3::z()).dot(&view_w).abs() > MIN_FACING)
             .or_else(|| horizontal(&facing))?;
         let origin_c = camera.to_left(&clamp.at(0.0).p_m);
         if origin_c.z < 0.05 {
@@ -91,7 +91,7 @@ fn main_direction(clamp: &dyn AttachMotion, until_s: f64) -> Option<Vector3<f64>
     }) / count;
     let eigen = spread.symmetric_eigen();
     let main = eigen.eigenvalues.imax();
-    (eigen.eigenvalues[main].max(0.0).sqrt() > LEAST_SPREAD_M).then(|| {
+    (eigen.eigenvalues[main].max(0.0).sqrt() > MIN_SPREAD_M).then(|| {
         let d = eigen.eigenvectors.column(main);
         Vector3::new(d[0], d[1], 0.0)
     })

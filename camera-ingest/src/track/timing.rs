@@ -22,10 +22,10 @@ const CLEAR: f64 = 0.6;
 /// What lies beside the rope may pull it aside by this much in every frame (px).
 const STEADY_PX: f64 = 0.25;
 /// Nodes and frames needed.
-const LEAST_NODES: usize = 6;
-const LEAST_FRAMES: usize = 30;
+const MIN_NODES: usize = 6;
+const MIN_FRAMES: usize = 30;
 /// The clamp must move by this much across the rope (m, root mean square).
-const LEAST_MOTION_M: f64 = 0.005;
+const MIN_MOTION_M: f64 = 0.005;
 /// Difference of times for speeds and accelerations (s).
 const STEP_S: f64 = 5e-3;
 /// Rounds of the fit, which is nearly linear, with all frames, and as many without
@@ -87,7 +87,7 @@ fn continued(nodes: &[(Point, f64)], first: usize, part: f64) -> Option<(Point, 
         .filter(|(_, (_, confidence))| *confidence > CLEAR)
         .map(|(i, (point, _))| (Vector3::new(1.0, i, i * i), *point))
         .collect();
-    if clear.len() < LEAST_NODES {
+    if clear.len() < MIN_NODES {
         return None;
     }
     let inverse = inverse_normal(clear.iter().map(|(powers, _)| powers))?;
@@ -139,7 +139,7 @@ fn fit_part(
     let mut x = Vector3::zeros();
     let mut found = None;
     for round in 0..2 * ROUNDS {
-        if kept.len() < LEAST_FRAMES {
+        if kept.len() < MIN_FRAMES {
             return None;
         }
         let rows: Vec<(Vector3<f64>, f64)> = kept
@@ -159,7 +159,7 @@ fn fit_part(
         }
     }
     let covariance = found?;
-    if motion_m(&kept, reported) < LEAST_MOTION_M {
+    if motion_m(&kept, reported) < MIN_MOTION_M {
         return None;
     }
     Some(ClampFit {

@@ -58,10 +58,10 @@ fn warnings_states_and_modes_change_by_themselves() {
 
 #[test]
 fn a_second_commander_moves_stops_or_takes_the_arm_away() {
-    let run = |wish: &str| {
+    let run = |request: &str| {
         let script = entry(
             "on = 'setpoint:10'",
-            &format!("second_commander, wish = '{wish}', rate_hz = 50, duration_s = 0.1"),
+            &format!("second_commander, request = '{request}', rate_hz = 50, duration_s = 0.1"),
         );
         let mut b = Scenario::new(&script);
         b.bring_up(Mode::Servo);
@@ -79,8 +79,8 @@ fn a_second_commander_moves_stops_or_takes_the_arm_away() {
         b.arm.model().reference_motion().q[6].abs() < 1e-9,
         "ours is newest"
     );
-    for wish in ["stop", "mode"] {
-        let b = run(wish);
+    for request in ["stop", "mode"] {
+        let b = run(request);
         assert!(b.status().is_not_ready());
     }
 }

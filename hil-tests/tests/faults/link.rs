@@ -134,7 +134,7 @@ fn fault_08_a_reply_with_a_warning_is_counted_one_with_an_error_ends_the_motion(
 fn fault_13_a_second_commander_is_noticed_by_the_arms_own_target() {
     let script = entry(
         "at_s = 1.5",
-        "second_commander, wish = 'setpoints', rate_hz = 60, duration_s = 1",
+        "second_commander, request = 'setpoints', rate_hz = 60, duration_s = 1",
     );
     let mut stage = Stage::ready(CommandInterface::ServoPosition, &script);
     stage.rig.run_for(2.0);
@@ -150,13 +150,14 @@ fn fault_13_a_second_commander_is_noticed_by_the_arms_own_target() {
 
 #[test]
 fn fault_13_a_second_commander_in_the_middle_of_a_throw_ends_it() {
-    let commander = |wish: &str| {
-        let fault = format!("second_commander, wish = '{wish}', rate_hz = 50, duration_s = 0.2");
+    let commander = |request: &str| {
+        let fault =
+            format!("second_commander, request = '{request}', rate_hz = 50, duration_s = 0.2");
         mid_throw(&fault)
     };
     let not_ready = silenced(FaultCode::ArmNotReady);
-    for wish in ["stop", "mode"] {
-        assert_stopped_by(&commander(wish), not_ready, [0.1, 0.0], |_, _| ());
+    for request in ["stop", "mode"] {
+        assert_stopped_by(&commander(request), not_ready, [0.1, 0.0], |_, _| ());
     }
     // Positions are nothing to an arm that follows velocities.
     let script = commander("setpoints");

@@ -157,7 +157,7 @@ fn fault_03_patience_does_not_turn_a_gap_into_a_jump() {
         };
         let mut stage = Stage::of(config);
         stage.begin();
-        stage.run_part(0.5);
+        stage.run_fraction(0.5);
         stage.rig.oversleep([160 * MS]);
         stage.finish();
         stage.assert_stop(match via {

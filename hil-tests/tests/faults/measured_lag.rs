@@ -85,7 +85,7 @@ impl Case {
     /// What stops the throw, in which nothing happens but that `late` cycles are lost.
     fn stopped_by(&self, measured: MeasuredLags, late: u64) -> Option<CauseRecord> {
         let mut stage = self.stage(measured, "");
-        stage.run_part(0.5);
+        stage.run_fraction(0.5);
         stage.rig.oversleep([late * 4_000_000]);
         stage.finish();
         let causes = &stage.rig.log.causes;

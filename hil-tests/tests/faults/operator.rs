@@ -67,7 +67,7 @@ impl Withdrawal {
 /// Stops `stage` after `part` of its throw; asserts that the very next cycle
 /// brakes and that everything to standstill is within limits.
 fn assert_braked_at(stage: &mut Stage, how: Withdrawal, part: f64) {
-    stage.run_part(part);
+    stage.run_fraction(part);
     stage.assert_mode(ControllerMode::Streaming);
     let last = *stage.rig.log.records.last().unwrap();
     let before = last.cycle;

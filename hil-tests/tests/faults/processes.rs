@@ -25,7 +25,7 @@ use xarm_sim::JointSample;
 fn fault_25_a_throw_whose_planner_is_gone_is_the_same_to_the_bit() {
     for via in INTERFACES {
         let mut stage = Stage::throwing(via, "");
-        stage.run_part(0.5);
+        stage.run_fraction(0.5);
         let mut other = stage.throw.start();
         other[0] += 0.3;
         for _ in 0..3 {
@@ -77,7 +77,7 @@ fn fault_27_a_wiggle_ends_gently_whatever_the_camera_does() {
 fn fault_28_a_controller_that_is_killed_leaves_an_arm_that_holds_or_brakes() {
     for via in INTERFACES {
         let mut stage = Stage::throwing(via, "");
-        stage.run_part(0.55);
+        stage.run_fraction(0.55);
         let (before, commands) = (stage.rig.log.truth.len(), stage.commands());
         let speed = stage.speed();
         assert!(speed > 1.0, "{speed}");
@@ -108,7 +108,7 @@ fn fault_28_a_controller_that_is_killed_leaves_an_arm_that_holds_or_brakes() {
 #[test]
 fn fault_28_in_velocity_mode_the_arm_stops_by_itself() {
     let mut stage = Stage::throwing(CommandInterface::JointVelocity, "");
-    stage.run_part(0.55);
+    stage.run_fraction(0.55);
     let (before, speed) = (stage.rig.log.truth.len(), stage.speed());
     stage.rig.kill_controller(2.0);
     let dead = &stage.rig.log.truth[before..];

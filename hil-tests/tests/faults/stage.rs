@@ -119,7 +119,7 @@ impl Stage {
         happens: impl FnOnce(&mut VirtualRig),
     ) -> Self {
         let mut stage = Self::throwing(via, "");
-        stage.run_part(part);
+        stage.run_fraction(part);
         happens(&mut stage.rig);
         stage.finish();
         stage
@@ -171,7 +171,7 @@ impl Stage {
     }
 
     /// Runs for a part of the throw.
-    pub(crate) fn run_part(&mut self, part: f64) {
+    pub(crate) fn run_fraction(&mut self, part: f64) {
         self.rig.run_for(part * self.throw.duration_s());
     }
 

@@ -137,7 +137,7 @@ pub struct Stand {
 }
 
 impl Stand {
-    /// A stand without special wishes.
+    /// A stand without special settings.
     pub fn start(name: &str) -> Self {
         Self::with(name, ArmConfig::default(), |_| ())
     }

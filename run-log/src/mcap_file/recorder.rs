@@ -363,7 +363,7 @@ pub(super) fn listen(config: &RecorderConfig, stop: &AtomicBool) -> Result<Recor
     let mut results = Results::of(&config.run);
     let mut looked = Instant::now();
     loop {
-        // Looked at before draining: what came before the wish to stop is kept.
+        // Looked at before draining: what came before the request to stop is kept.
         let last = stop.load(Ordering::SeqCst);
         recording.drain(&ports)?;
         let most = if last {

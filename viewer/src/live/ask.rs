@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// Longest wait for the controller's answer.
 const PATIENCE: Duration = Duration::from_secs(6);
 
-/// A wish. None of them can make the arm move, or enable it.
+/// A request. None of them can make the arm move, or enable it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Ask {
@@ -59,17 +59,17 @@ impl Ask {
     }
 }
 
-/// A wish on its way, with the place for its answer.
+/// A request on its way, with the place for its answer.
 #[derive(Debug)]
 pub(crate) struct Requested {
     pub ask: Ask,
     pub reply: mpsc::Sender<Answer>,
 }
 
-/// Whether a wish was done; why not, in one sentence.
+/// Whether a request was done; why not, in one sentence.
 pub(crate) type Answer = Result<(), String>;
 
-/// A wish that the controller has got.
+/// A request that the controller has got.
 #[derive(Debug)]
 pub(crate) struct Open {
     pending: Pending<ControllerRpc>,
@@ -79,7 +79,7 @@ pub(crate) struct Open {
     reply: mpsc::Sender<Answer>,
 }
 
-/// Hands a wish to the controller; one that may not be asked for, or cannot be, is
+/// Hands a request to the controller; one that may not be asked for, or cannot be, is
 /// answered at once.
 pub(crate) fn hand_over(
     requested: Requested,
@@ -108,7 +108,7 @@ pub(crate) fn hand_over(
 }
 
 impl Open {
-    /// Passes the answer on if it is there; whether the wish is still open.
+    /// Passes the answer on if it is there; whether the request is still open.
     pub(crate) fn is_open(&self) -> bool {
         let answer = match self.pending.try_next() {
             Ok(Some(ControllerEvent::Done)) => Ok(()),

@@ -39,7 +39,7 @@ use std::time::{Duration, Instant};
 /// Time between two states while a page is open, and while none is.
 const TURN: Duration = Duration::from_millis(40);
 const TURN_ALONE: Duration = Duration::from_millis(200);
-/// Time between two looks for the answer to a wish.
+/// Time between two looks for the answer to a request.
 const ANSWERS: Duration = Duration::from_millis(5);
 /// Time between two looks for a controller, and at the run folder.
 const SEARCH: Duration = Duration::from_millis(500);

@@ -30,7 +30,7 @@ pub(crate) struct Snapshot {
     pub missed: u64,
     /// Whether a camera's frames come.
     pub camera: bool,
-    /// Each wish, and why it may not be asked for now.
+    /// Each request, and why it may not be asked for now.
     pub asks: Vec<(Ask, Option<&'static str>)>,
 }
 

@@ -2,7 +2,7 @@
 
 use super::client::{Client, Service};
 use super::{ArmEndpoint, ArmEvent};
-use crate::fault::{FaultKind, ForeignWish, Progress};
+use crate::fault::{FaultKind, ForeignRequest, Progress};
 use rt_controller::xarm::{Command, Mode, StateRequest};
 use shared_types::MonotonicNs;
 
@@ -66,21 +66,21 @@ impl ArmEndpoint {
     /// Sends what the second commander sends at `now`, if there is one.
     pub(super) fn run_second_commander(&mut self, now: MonotonicNs) {
         let found = self.faults.active().find_map(|fault| match fault {
-            FaultKind::SecondCommander { wish, rate_hz } => Some((*wish, *rate_hz)),
+            FaultKind::SecondCommander { request, rate_hz } => Some((*request, *rate_hz)),
             _ => None,
         });
-        let Some((wish, rate_hz)) = found.filter(|_| now >= self.foreign_due) else {
+        let Some((request, rate_hz)) = found.filter(|_| now >= self.foreign_due) else {
             return;
         };
         self.foreign_due = self.foreign_due.plus_s(1.0 / rate_hz);
-        let command = match wish {
-            ForeignWish::Setpoints => {
+        let command = match request {
+            ForeignRequest::Setpoints => {
                 let mut q = self.model.measured_motion().q;
                 q[6] += FOREIGN_OFFSET_RAD;
                 Command::ServoJoint(q)
             }
-            ForeignWish::Stop => Command::SetState(StateRequest::Stop),
-            ForeignWish::Mode => Command::SetMode(Mode::Position),
+            ForeignRequest::Stop => Command::SetState(StateRequest::Stop),
+            ForeignRequest::Mode => Command::SetMode(Mode::Position),
         };
         self.model.command_from(SECOND_COMMANDER, now, &command);
     }

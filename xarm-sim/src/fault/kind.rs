@@ -37,7 +37,7 @@ pub enum ReportPort {
 /// What a second commander does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum ForeignWish {
+pub enum ForeignRequest {
     /// Streams setpoints of its own, 1 mrad beside the arm's pose.
     #[default]
     Setpoints,
@@ -129,7 +129,7 @@ pub enum FaultKind {
     SecondCommander {
         /// What it sends.
         #[serde(default)]
-        wish: ForeignWish,
+        request: ForeignRequest,
         /// How often (Hz).
         rate_hz: f64,
     },

@@ -8,7 +8,7 @@ pub mod kind;
 mod runner;
 mod script;
 
-pub use kind::{FaultKind, ForeignWish, PortSet, ReportPort};
+pub use kind::{FaultKind, ForeignRequest, PortSet, ReportPort};
 pub use script::{Fault, FaultScript, FaultScriptError, Trigger};
 
 pub(super) use runner::{FaultRunner, Progress};

@@ -26,12 +26,12 @@ impl ArmModel {
             } => {
                 if self.can_move() && self.mode == Mode::JointVelocity {
                     let known = self.config.firmware.has_velocity_duration();
-                    let wish = VelocityCommand {
+                    let request = VelocityCommand {
                         qd: *velocity,
                         synchronised: *synchronised,
                         duration_s: duration_s.filter(|_| known),
                     };
-                    self.take_velocity(at, wish);
+                    self.take_velocity(at, request);
                 } else {
                     self.ignore(command);
                 }
@@ -86,19 +86,19 @@ impl ArmModel {
         });
     }
 
-    fn take_velocity(&mut self, at: MonotonicNs, wish: VelocityCommand) {
+    fn take_velocity(&mut self, at: MonotonicNs, request: VelocityCommand) {
         let limits = &self.config.limits.velocity_max_rad_s;
-        if (0..JOINTS).any(|j| wish.qd[j].abs() > limits[j]) {
+        if (0..JOINTS).any(|j| request.qd[j].abs() > limits[j]) {
             return self.raise(ErrorCode::SPEED_LIMIT);
         }
         self.counters.motion_commands += 1;
         self.log(ArmEvent::Velocity {
-            qd: wish.qd,
-            duration_s: wish.duration_s,
+            qd: request.qd,
+            duration_s: request.duration_s,
         });
         let at = at.max(self.time);
         self.run_velocity(at);
-        self.velocity.offer(at, wish);
+        self.velocity.offer(at, request);
         self.run_velocity(at);
     }
 

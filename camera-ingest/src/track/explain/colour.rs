@@ -14,7 +14,7 @@ pub(super) const CHROMA_WEIGHT: f32 = 1.5;
 /// Colours further apart than this are of two yarns or two sides (levels).
 const APART: f32 = 30.0;
 /// Groups with a smaller share are not the thing's own.
-const LEAST_SHARE: f32 = 0.07;
+const MIN_SHARE: f32 = 0.07;
 /// A round thing is lit from one side.
 pub(super) const SHADES: [f32; 5] = [0.7, 0.85, 1.0, 1.15, 1.3];
 /// Coverage from which a pixel is the thing's edge, and what is added until it is the
@@ -154,7 +154,7 @@ pub(super) fn groups(samples: &[Colour], count: usize) -> Vec<Colour> {
     }
     let sizes: Vec<usize> = members(&centres).iter().map(Vec::len).collect();
     let mut order: Vec<usize> = (0..centres.len()).collect();
-    order.retain(|i| sizes[*i] as f32 > LEAST_SHARE * samples.len() as f32);
+    order.retain(|i| sizes[*i] as f32 > MIN_SHARE * samples.len() as f32);
     order.sort_by_key(|i| core::cmp::Reverse(sizes[*i]));
     order.into_iter().map(|i| centres[i]).collect()
 }

@@ -87,7 +87,7 @@ pub(super) fn respaced(points: &[Pixel], like: &[Pixel]) -> Vec<Pixel> {
 }
 
 /// Place at a part of the points' count, drawn on beyond the last one: 0 first, 1 last.
-pub(super) fn at_part(points: &[Pixel], part: f64) -> Pixel {
+pub(super) fn at_fraction(points: &[Pixel], part: f64) -> Pixel {
     let last = points.len() - 1;
     let place = part * last as f64;
     if place >= last as f64 {
@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(from_end(&line, 5.0), (place(25.0), Pixel::y()));
         assert_eq!(from_end(&line, -5.0), (place(15.0), Pixel::y()));
         for (part, y) in [(0.25, 5.0), (1.1, 22.0), (-0.1, -2.0)] {
-            assert_eq!(at_part(&line, part), place(y));
+            assert_eq!(at_fraction(&line, part), place(y));
         }
         assert_eq!(normals(&line).nth(4), Some(-Pixel::x()));
         // Unevenly spaced, and twice as long.

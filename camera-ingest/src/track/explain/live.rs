@@ -8,7 +8,7 @@ use shared_types::{MonotonicNs, StereoCamera};
 use super::super::scene::Scene;
 use super::super::{TrackError, USUAL_KEYPOINTS};
 use super::Film;
-use super::curve::{Pixel, at_part, length, normals};
+use super::curve::{Pixel, at_fraction, length, normals};
 use super::explainer::{Explained, Explainer};
 use super::hypothesis::{CLOCK, Fidelity, rope, seen_curve, turned};
 use super::read::NODES;
@@ -139,7 +139,7 @@ impl Known {
     fn keypoints(&self, curve: &[Pixel], count: usize) -> Vec<Pixel> {
         let [first, last] = self.ends;
         let part = |k: usize| first + (last - first) * k as f64 / (count - 1) as f64;
-        (0..count).map(|k| at_part(curve, part(k))).collect()
+        (0..count).map(|k| at_fraction(curve, part(k))).collect()
     }
 
     /// How evident it is (0 to 1) that something other than the scene is at each place.

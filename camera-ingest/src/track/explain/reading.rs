@@ -1,7 +1,7 @@
 //! What was read off a film: a curve in every frame, and its two ends.
 
 use super::colour::Colour;
-use super::curve::{Pixel, across, at_part, from_end, length};
+use super::curve::{Pixel, across, at_fraction, from_end, length};
 use super::end::End;
 use super::field::Offset;
 use super::statistics::mean;
@@ -49,7 +49,7 @@ impl Reading {
         let place = |k: usize| {
             let at = first + (last - first) * k as f64 / (count - 1) as f64;
             if at <= edge {
-                return (at_part(curve, at), local_mean(evident, at));
+                return (at_fraction(curve, at), local_mean(evident, at));
             }
             let w = (at - edge) / (last - edge);
             (edge_place + (tip - edge_place) * w, aside.weight)

@@ -27,7 +27,7 @@ const PRIOR: f64 = 0.1;
 const SLOPE: f64 = 0.03;
 /// Cauchy's scale in medians of the distance, and at least (px).
 const SCALE: f64 = 2.0;
-const LEAST_SCALE_PX: f64 = 0.3;
+const MIN_SCALE_PX: f64 = 0.3;
 /// Dampings tried side by side.
 const DAMPINGS: [f64; 8] = [1e-5, 1e-3, 1e-2, 0.1, 0.5, 3.0, 30.0, 300.0];
 
@@ -90,7 +90,7 @@ impl Fit<'_> {
         };
         for _ in 0..STEPS {
             let sizes = misses.iter().map(|[px, _]| px.abs());
-            let scale_px = (SCALE * quantile(sizes, 0.5)).max(LEAST_SCALE_PX);
+            let scale_px = (SCALE * quantile(sizes, 0.5)).max(MIN_SCALE_PX);
             let Some((normal, slope)) = self.linearised(&x, &misses, scale_px)? else {
                 break;
             };

@@ -17,11 +17,11 @@ use crate::frame::rgb_from_ycc;
 
 /// Evidence of the rope, in the middle over nodes and frames and in the least evident
 /// tenth of either, below which a hypothesis explains too little.
-const LEAST_EVIDENT: [f64; 3] = [0.35, 0.12, 0.12];
+const MIN_EVIDENT: [f64; 3] = [0.35, 0.12, 0.12];
 /// A frame with less than this part of the usual evidence is lost.
 const LOST: f64 = 0.2;
 /// Nothing seen is more certain than this.
-const MOST_CONFIDENT: f64 = 0.98;
+const MAX_CONFIDENCE: f64 = 0.98;
 /// Nodes at the clamp that show the pole as much as the rope.
 const CLAMP_NODES: usize = 2;
 
@@ -41,10 +41,10 @@ pub(super) fn usual_evidence(reading: &Reading, keypoints: usize) -> Result<f64,
         ?found,
         "evidence of the rope: middle, least nodes, least frames"
     );
-    if found.iter().zip(LEAST_EVIDENT).any(|(f, least)| *f < least) {
+    if found.iter().zip(MIN_EVIDENT).any(|(f, least)| *f < least) {
         return Err(TrackError::NoRope {
             evident: found,
-            least: LEAST_EVIDENT,
+            least: MIN_EVIDENT,
         });
     }
     Ok(usual)
@@ -68,7 +68,7 @@ pub(super) fn result(
         let confidence = |(k, e): (usize, &f64)| {
             let part = k as f64 / (keypoints - 1) as f64;
             let confirmed = testimony.map_or(1.0, |t| t.around(index).max(t.along(part)));
-            (e / usual).min(1.0) * confirmed.min(MOST_CONFIDENT)
+            (e / usual).min(1.0) * confirmed.min(MAX_CONFIDENCE)
         };
         let lost = mean(&evident) < LOST * usual;
         if !lost {

@@ -22,7 +22,7 @@ const NEAR_PX: f64 = 3.0;
 /// What all may have in common: the right image's calibration (px).
 const COMMON_PX: f64 = 4.0;
 /// Least contrast of what is found.
-const LEAST: f64 = 0.3;
+const MIN_WEIGHT: f64 = 0.3;
 
 /// One frame of the second image.
 struct Sight<'a> {
@@ -92,11 +92,11 @@ impl Testimony {
             offsets(&sight.curve, look, |p| lit.present(&rope, p))
         };
         let found: Vec<Vec<Offset>> = sights.iter().map(offsets).collect();
-        let clear = found.iter().flatten().filter(|o| o.weight > LEAST);
+        let clear = found.iter().flatten().filter(|o| o.weight > MIN_WEIGHT);
         let common_px = median(clear.map(|o| o.px));
         let confirms = |o: &Offset| {
             let is_near = (o.px - common_px).abs() <= NEAR_PX;
-            f64::from(o.weight > LEAST && is_near && common_px.abs() <= COMMON_PX)
+            f64::from(o.weight > MIN_WEIGHT && is_near && common_px.abs() <= COMMON_PX)
         };
         let confirmed: Vec<Vec<f64>> = found
             .iter()

@@ -38,7 +38,7 @@ const ANSWER_PATIENCE: Duration = Duration::from_secs(8);
 /// Stack of a connection's thread (bytes).
 const STACK_BYTES: usize = 256 * 1024;
 
-/// What the server hands out, and where wishes go.
+/// What the server hands out, and where requests go.
 #[derive(Debug)]
 pub(crate) struct Site {
     token: Token,
@@ -81,7 +81,7 @@ impl Drop for Place<'_> {
     }
 }
 
-/// Begins to serve at `bind`. Returns the page's address and what it shows; wishes
+/// Begins to serve at `bind`. Returns the page's address and what it shows; requests
 /// come out of `asks`' other end.
 pub(crate) fn serve(
     bind: SocketAddr,
@@ -176,7 +176,7 @@ fn answer(site: &Site, method: &str, path: Option<&str>, query: &str) -> Reply {
         ("GET", Some("watch.css")) => Reply::of("text/css; charset=utf-8", page::style()),
         ("GET", Some("picture")) => picture(site, query),
         ("POST", Some(_)) if ask.is_some() => match ask.and_then(Ask::named) {
-            Some(ask) => wish(site, ask),
+            Some(ask) => request(site, ask),
             None => Reply::said(404, "unknown request"),
         },
         ("GET" | "POST", Some(path))
@@ -228,8 +228,8 @@ fn picture(site: &Site, query: &str) -> Reply {
     }
 }
 
-/// Passes a wish on and waits for the controller's answer.
-fn wish(site: &Site, ask: Ask) -> Reply {
+/// Passes a request on and waits for the controller's answer.
+fn request(site: &Site, ask: Ask) -> Reply {
     let (reply, answers) = mpsc::channel();
     let asks = site.asks.lock().unwrap_or_else(PoisonError::into_inner);
     let sent = asks.send(Requested { ask, reply });
