@@ -422,6 +422,19 @@ mod tests {
     }
 
     #[test]
+    fn an_arm_that_is_refused_before_the_first_cycle_has_no_table_of_cycles() {
+        let refused = RunLog {
+            samples: Vec::new(),
+            ..log(vec![cause()])
+        };
+        let page = super::super::show(&explain(&refused));
+        assert!(
+            page.contains("STOPPED") && !page.contains("until ms"),
+            "{page}"
+        );
+    }
+
+    #[test]
     fn a_controller_that_is_ended_at_rest_was_not_stopped() {
         let end = CauseRecord {
             code: FaultCode::OperatorStop as u16,

@@ -74,7 +74,10 @@ fn show_stop(page: &mut String, stop: &Stop) {
             let _ = writeln!(page, "  {name:<NAME$} {text}");
         }
     }
-    let _ = writeln!(page, "\n{}", around(&stop.cycles_around));
+    // An arm that is refused while it is brought up is stopped before the first cycle.
+    if !stop.cycles_around.is_empty() {
+        let _ = writeln!(page, "\n{}", around(&stop.cycles_around));
+    }
 }
 
 fn by_how_much(stop: &Stop) -> String {

@@ -7,7 +7,7 @@ use super::plan::LOOK;
 use super::unconfirmed::confirm;
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
-use crate::pipeline::{self, ArmAddress, ArmLink};
+use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
 use crate::session::Session;
 use arm_model::{JOINTS, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
@@ -81,6 +81,7 @@ pub fn drive(
     let slow_enough = armed.check(&Motion::Spline(*trajectory));
     slow_enough.map_err(|why| bad_input!("the {name} is too fast: {why}"))?;
     if arm.dry_run {
+        out.map_or(Ok(()), RunFolder::refuse_existing)?;
         return dry_run::tell(arm, limits, trajectory, name).map(Some);
     }
     let Some(address) = address else {

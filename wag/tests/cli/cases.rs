@@ -47,6 +47,7 @@ pub(crate) const MACHINES: &str = "
     demo --target 0,0,0.2 => arm's base
     demo --rig-config none.toml => none.toml
     wiggle --dry-run --csv no/w.csv => no/w.csv | folder
+    wiggle --dry-run --out . => exists already
     wiggle --arm no..host --dry-run => no..host";
 
 /// Commands that read, list or watch runs.

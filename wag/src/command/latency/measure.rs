@@ -48,9 +48,10 @@ fn intent(args: &LatencyArgs, address: Option<&ArmAddress>) -> Outcome<Intent> {
 pub(super) fn dry_run(args: &LatencyArgs) -> Outcome<Value> {
     let (_, _, sweeps) = intent(args, None)?;
     let moving_s: f64 = sweeps.iter().map(|(_, t)| t.duration_s()).sum();
+    let joints: Vec<String> = sweeps.iter().map(|(joint, _)| joint.to_string()).collect();
     println!(
-        "dry run: {} sweeps keep all limits and would move the arm for {moving_s:.0} s; nothing was connected",
-        sweeps.len()
+        "dry run: sweeps of joints {} keep all limits and would move the arm for {moving_s:.0} s; nothing was connected",
+        joints.join(", ")
     );
     Ok(json!({
         "ok": true, "command": "latency", "dry_run": true, "sweeps": sweeps.len(), "duration_s": moving_s,
