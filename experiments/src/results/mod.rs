@@ -33,6 +33,7 @@ type Study = fn(Experiment<'_>) -> Outcome<Option<Value>>;
 pub fn run(command: &ResultCommand) -> Outcome<Option<Value>> {
     let (name, args, study): (_, &ResultArgs, Study) = match command {
         ResultCommand::OtherReality(args) => return other_reality::run(args),
+        ResultCommand::FullPipeline(args) => return other_reality::run_full(args),
         ResultCommand::Sysid(args) => ("sysid", args, sysid::run),
         ResultCommand::MotionFidelity(args) => ("motion-fidelity", args, fidelity::run),
         ResultCommand::SysidOod(args) => ("sysid-ood", args, ood::run),

@@ -1,6 +1,7 @@
 //! What is drawn for one rope: the rope, how reality differs from the model, and by how much.
 
 use super::child::OtherRope;
+use super::kinds::{CONFIGURATIONS, RopeKind};
 use crate::args::ChannelName;
 use arm_model::kinematics::FrameMotion;
 use arm_model::response::{Estimate, JointResponse, TrackingLag};
@@ -17,6 +18,8 @@ use std::f64::consts::TAU;
 
 /// Keeps these ropes apart from those of other studies.
 const SALT: u64 = 0x6f74_6872;
+/// And those of the paper's ropes.
+const PAPER_SALT: u64 = 0x7061_7065;
 /// Distance at which the camera looks at the rope (m).
 const CAMERA_DEPTH_M: f64 = 1.0;
 
@@ -80,11 +83,32 @@ pub(super) struct Case {
 
 impl Case {
     /// Rope `index` of `seed` with one channel, or all, of so many links for each of its own.
-    /// What a channel draws does not depend on which of them are asked for.
     pub fn draw(seed: u64, index: u64, channel: ChannelName, refinement: u32) -> Self {
         let trial = ((SALT ^ seed) << 32) ^ index;
         let mut rng = ChaCha12Rng::seed_from_u64(trial);
         let params = rope(seed, index, &mut rng);
+        Self::of(trial, rng, params, (channel, refinement))
+    }
+
+    /// Case `index` of the paper's ropes and configurations, kind by kind, with all channels.
+    pub fn of_paper(seed: u64, index: u64, refinement: u32) -> (RopeKind, (f64, f64), Self) {
+        let kinds = RopeKind::ALL.len() as u64;
+        let kind = RopeKind::ALL[(index % kinds) as usize];
+        let configuration = CONFIGURATIONS[(index / kinds) as usize % CONFIGURATIONS.len()];
+        let trial = ((PAPER_SALT ^ seed) << 32) ^ index;
+        let mut rng = ChaCha12Rng::seed_from_u64(trial);
+        let params = kind.rope(configuration, &mut rng);
+        let case = Self::of(trial, rng, params, (ChannelName::All, refinement));
+        (kind, configuration, case)
+    }
+
+    /// What a channel draws does not depend on which of them are asked for.
+    fn of(
+        trial: u64,
+        mut rng: ChaCha12Rng,
+        params: RopeParams,
+        (channel, refinement): (ChannelName, u32),
+    ) -> Self {
         let mut uniform = |low: f64, high: f64| rng.random_range(low..=high);
         let mut direction = || {
             let angle = uniform(0.0, TAU);

@@ -1,0 +1,247 @@
+//! A rope in MuJoCo, filmed, identified and thrown at its target.
+
+use super::case::Case;
+use super::child::Mujoco;
+use crate::results::experiment::Experiment;
+use anyhow::Context;
+use arm_model::{Cell, JointTrajectory};
+use experiments::trials::{KEYPOINTS, alone};
+use nalgebra::Vector3;
+use planner::identify::IdentifyOptions;
+use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, simulator_for};
+use planner::synthetic::{FilmTiming, Filmed, RopeFilm, project};
+use rope_sim::{FrameTimes, PlannedArm, Sway};
+use serde::{Deserialize, Serialize};
+use shared_types::{ErrorForecast, Plan, RopeEstimate, RopeParams, Task};
+use std::ops::ControlFlow;
+
+/// Ropes that a forecast is made with.
+const FORECAST: usize = 64;
+/// Time between kept positions of a film (s).
+const FILM_PERIOD_S: f64 = 1.0 / 240.0;
+/// Time between positions of the tip in a throw (s); it moves straight in between.
+const THROW_PERIOD_S: f64 = 1e-3;
+
+/// What became of a rope.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Fate {
+    /// Identification or planning refused, in these words.
+    Refused(String),
+    /// It was thrown.
+    Thrown(Thrown),
+}
+
+/// A throw.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Thrown {
+    /// Closest approach of tip and target (m).
+    pub miss_m: f64,
+    /// The one that the plan predicted (m).
+    pub predicted_m: f64,
+    /// Length that it was planned with minus the true one (m).
+    pub length_error_m: f64,
+    /// How the film was fitted; none for a rope that was not identified.
+    pub fit: Option<Fit>,
+    pub forecast: Option<ErrorForecast>,
+}
+
+/// How a film was fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Fit {
+    pub residual_px: f64,
+    pub out_of_distribution: f64,
+    /// Whether the rope was taken for one outside the ranges.
+    pub outside: bool,
+}
+
+impl Fate {
+    pub fn thrown(&self) -> Option<&Thrown> {
+        match self {
+            Self::Thrown(thrown) => Some(thrown),
+            Self::Refused(_) => None,
+        }
+    }
+
+    /// A refusal of identification or planning is a result.
+    fn refused(why: &anyhow::Error) -> Self {
+        Self::Refused(format!("{why:#}"))
+    }
+}
+
+/// Films and throws in MuJoCo; identifies and plans with the product's own equations.
+pub(super) struct Reality<'a> {
+    pub experiment: &'a Experiment<'a>,
+    pub mujoco: Mujoco,
+}
+
+impl Reality<'_> {
+    /// Trial `index`: filmed, identified, planned for and thrown.
+    ///
+    /// # Errors
+    /// MuJoCo fails. What identification or planning refuses is a fate.
+    pub fn identified(&self, index: u64, case: &Case) -> anyhow::Result<Fate> {
+        // The fit hears what the joints report; the arm is where it is.
+        let wiggle = self.experiment.rig.motion.trajectory();
+        let reported = case.arm.reported(wiggle)?;
+        let filmed = self.film(case, &reported)?;
+        let found = match self.identify(index, &filmed, &reported) {
+            Ok(found) => found,
+            Err(refusal) => return Ok(Fate::refused(&refusal)),
+        };
+        let (rope, posterior) = (&found.params, &found.posterior);
+        let seed = self.experiment.args.seed ^ index;
+        let ensemble = PosteriorEnsemble::drawn(rope, posterior, 0, FORECAST, seed);
+        let fit = Fit {
+            residual_px: found.residual_px,
+            out_of_distribution: found.out_of_distribution.score,
+            outside: found.out_of_distribution.is_outside(),
+        };
+        self.thrown(index, case, (rope, ensemble), Some(fit))
+    }
+
+    /// Trial `index`: planned for `rope`, whichever it is, and thrown with the case's.
+    ///
+    /// # Errors
+    /// MuJoCo fails.
+    pub fn planned_for(&self, index: u64, case: &Case, rope: &RopeParams) -> anyhow::Result<Fate> {
+        self.thrown(index, case, (rope, PosteriorEnsemble::default()), None)
+    }
+
+    fn thrown(
+        &self,
+        index: u64,
+        case: &Case,
+        (rope, ensemble): (&RopeParams, PosteriorEnsemble),
+        fit: Option<Fit>,
+    ) -> anyhow::Result<Fate> {
+        let planned = match self.plan(index, case, rope, ensemble) {
+            Ok(planned) => planned,
+            Err(refusal) => return Ok(Fate::refused(&refusal)),
+        };
+        Ok(Fate::Thrown(Thrown {
+            miss_m: self.throw(case, &planned)?,
+            predicted_m: planned.predicted_error_m,
+            length_error_m: rope.length_m - case.rope.params.length_m,
+            fit,
+            forecast: planned.forecast,
+        }))
+    }
+
+    fn film(&self, case: &Case, reported: &JointTrajectory) -> anyhow::Result<Filmed> {
+        let timing = FilmTiming::default();
+        let times = FrameTimes {
+            first_s: 0.0,
+            period_s: FILM_PERIOD_S,
+            count: ((timing.duration_s() + 0.05) / FILM_PERIOD_S).ceil() as usize,
+        };
+        let motion = |t_s| case.arm.attach_frame(reported, t_s);
+        let points = self
+            .mujoco
+            .simulate(&case.rope, motion, case.seed, &times, KEYPOINTS)?;
+        let positions_m = points.iter().flat_map(|p| p.cast::<f32>().data.0[0]);
+        let params = case.rope.params;
+        let film =
+            RopeFilm::from_positions(params, FILM_PERIOD_S, KEYPOINTS, positions_m.collect())
+                .context("a film without frames")?;
+        let camera = &self.experiment.rig.camera;
+        Ok(project(&film, camera, &timing, &case.film))
+    }
+
+    /// As `wag identify` does, with the experiment's method.
+    fn identify(
+        &self,
+        index: u64,
+        filmed: &Filmed,
+        reported: &JointTrajectory,
+    ) -> anyhow::Result<RopeEstimate> {
+        let Experiment { rig, options, .. } = self.experiment;
+        let motion = PlannedArm::new(*reported, Cell::default().pole);
+        let observation = planner::observation::Observation {
+            motion: &motion,
+            ..rig.observation(filmed)
+        };
+        let options = IdentifyOptions {
+            seed: options.seed ^ index,
+            ..alone(options)
+        };
+        let network = rig.network.as_deref();
+        let go_on = &mut |_| ControlFlow::Continue(());
+        let found = planner::identify(&observation, &options, network, go_on);
+        found.context("identification")
+    }
+
+    /// As `wag plan strike` does by default.
+    fn plan(
+        &self,
+        index: u64,
+        case: &Case,
+        rope: &RopeParams,
+        ensemble: PosteriorEnsemble,
+    ) -> anyhow::Result<Plan> {
+        let Experiment { config, args, .. } = self.experiment;
+        let seed = args.seed ^ index;
+        let options = PlanOptions {
+            seed,
+            threads: 1,
+            ..config.search
+        };
+        let goal = config.goal(Task::Strike, case.target_m);
+        let request = PlanRequest {
+            ensemble,
+            ..PlanRequest::new(goal, rope, options)
+        };
+        let planned = planner::plan(&request, &mut |_| ControlFlow::Continue(()));
+        planned.context("planning")
+    }
+
+    /// Distance of tip and target at their closest (m), watched as long as a plan is.
+    fn throw(&self, case: &Case, planned: &Plan) -> anyhow::Result<f64> {
+        let config = &self.experiment.config;
+        let goal = config.goal(Task::Strike, case.target_m);
+        let (task, params) = (goal.task(), &case.rope.params);
+        let simulator = simulator_for(task, params, &Cell::default(), &config.search);
+        let reported = case.arm.reported(&planned.trajectory)?;
+        let motion_s = reported.duration_s().max(simulator.motion_s_min);
+        let watched_s = motion_s + task.config().observed_s;
+        let times = FrameTimes {
+            first_s: 0.0,
+            period_s: THROW_PERIOD_S,
+            count: (watched_s / THROW_PERIOD_S).floor() as usize + 1,
+        };
+        let mut rope = case.rope;
+        // It was left to come to rest.
+        rope.sway = Sway::NONE;
+        let motion = |t_s| case.arm.attach_frame(&reported, t_s);
+        // And hangs in another of the shapes that friction holds.
+        let seed = case.seed.wrapping_add(1);
+        let ends = self.mujoco.simulate(&rope, motion, seed, &times, 2)?;
+        let tip: Vec<_> = ends.chunks_exact(2).map(|ends| ends[1]).collect();
+        Ok(closest_m(&tip, &case.target_m.into()))
+    }
+}
+
+/// Smallest distance of a point from the straight lines between the points of a path (m).
+fn closest_m(path: &[Vector3<f64>], point: &Vector3<f64>) -> f64 {
+    let to_line = |ends: &[Vector3<f64>]| {
+        let (way, to) = (ends[1] - ends[0], point - ends[0]);
+        let part = to.dot(&way) / way.norm_squared().max(1e-18);
+        (to - way * part.clamp(0.0, 1.0)).norm()
+    };
+    path.windows(2).map(to_line).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_closest_approach_lies_between_the_points_of_a_path() {
+        let path = [[0.0, 1.0, 0.0], [2.0, 1.0, 0.0], [2.0, 5.0, 0.0]].map(Vector3::from);
+        let from = |point: [f64; 3]| closest_m(&path, &point.into());
+        assert_eq!(from([1.0, 0.0, 0.0]), 1.0);
+        assert_eq!(from([-3.0, -3.0, 0.0]), 5.0);
+        assert_eq!(from([2.0, 3.0, 0.5]), 0.5);
+        assert_eq!(closest_m(&[], &Vector3::zeros()), f64::INFINITY);
+    }
+}
