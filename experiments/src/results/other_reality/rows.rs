@@ -2,9 +2,8 @@
 
 use super::throwing::Fate;
 use crate::report::Column;
-use crate::results::experiment::cm;
 use crate::results::picture::Curve;
-use experiments::trials::{mean, quantile};
+use experiments::trials::quantile;
 use serde::Serialize;
 
 /// What became of some ropes.
@@ -33,6 +32,27 @@ pub(super) struct Row {
     forecast_high_m: f64,
 }
 
+/// A number; a dash where there is none.
+fn number(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return "-".to_owned();
+    }
+    format!("{value:.digits$}")
+}
+
+fn cm(m: f64) -> String {
+    number(100.0 * m, 2)
+}
+
+/// Not a number for none.
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.collect();
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    experiments::trials::mean(values)
+}
+
 pub(super) const TABLE: [Column<Row>; 12] = [
     ("miss (cm)", |row| row.name.clone()),
     ("ropes", |row| row.ropes.to_string()),
@@ -43,17 +63,18 @@ pub(super) const TABLE: [Column<Row>; 12] = [
     ("max", |row| cm(row.max_m)),
     ("length error mean, max (mm)", |row| {
         let [mean, max] = [row.length_error_mean_m, row.length_error_max_m].map(|m| 1e3 * m);
-        format!("{mean:.1}, {max:.1}")
+        format!("{}, {}", number(mean, 1), number(max, 1))
     }),
-    ("residual (px)", |row| format!("{:.2}", row.residual_px)),
+    ("residual (px)", |row| number(row.residual_px, 2)),
     ("out of distribution, score", |row| {
-        format!("{:.2}", row.out_of_distribution)
+        number(row.out_of_distribution, 2)
     }),
-    ("flagged as outside", |row| {
-        format!("{:.0} %", 100.0 * row.outside)
+    ("flagged as outside (%)", |row| {
+        number(100.0 * row.outside, 0)
     }),
-    ("within its 90 % interval, up to (cm)", |row| {
-        format!("{:.0} %, {}", 100.0 * row.covered, cm(row.forecast_high_m))
+    ("within its 90 % interval (%), up to (cm)", |row| {
+        let held = number(100.0 * row.covered, 0);
+        format!("{held}, {}", cm(row.forecast_high_m))
     }),
 ];
 
