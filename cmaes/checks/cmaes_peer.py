@@ -1,8 +1,8 @@
 """Compares the planner's CMA-ES with the package `cma` on standard functions.
 
     python3 -m venv venv && venv/bin/pip install cma
-    cargo run --release -p planner --example cmaes_table > cmaes.csv
-    venv/bin/python planner/checks/cmaes_peer.py cmaes.csv
+    cargo run --release -p cmaes --example cmaes_table > cmaes.csv
+    venv/bin/python cmaes/checks/cmaes_peer.py cmaes.csv
 
 Every line of the table is one run: function, dimensions, seed, population,
 evaluations until the target, solved. The same runs are made with `cma`. Exit code 1 if

@@ -14,7 +14,7 @@ use shared_types::ipc::message::ControllerEvent;
 const SWING_RAD: f64 = 0.9;
 /// Waypoints of the swing.
 const WAYPOINTS: usize = 13;
-/// Longest and shortest swing that is tried (s).
+/// Shortest and longest swing that is tried, each 5 % longer than the one before (s).
 const LASTS_S: [f64; 2] = [0.4, 12.0];
 /// A joint that is slower stands still (rad/s).
 const STILL_RAD_S: f64 = 1e-2;
@@ -49,8 +49,8 @@ impl StopMethod {
     }
 }
 
-/// The fastest swing of joint 1 from the start pose that is allowed; `None` where none is, of
-/// up to 12 s.
+/// The shortest swing of joint 1 from the start pose that is tried and allowed; `None` where none
+/// of up to 12 s is.
 #[must_use]
 pub fn fastest_swing(speed: &ArmedSpeed<'_>) -> Option<JointTrajectory> {
     let lasting = |duration_s: f64| {
@@ -97,14 +97,23 @@ impl Stopping {
             reports.iter().partition(|r| r.stamp_ns <= told_ns);
         let before = before.last();
         let before = *before.ok_or("the arm reported no joints before it was stopped")?;
+        let first = *after.first().ok_or("the arm did not come to rest")?;
+        if before.qd.max_abs() <= STILL_RAD_S {
+            return Err("the arm stood still when it was stopped");
+        }
+        // Where it was in between: no part of the way before counts.
+        let since_ns = (told_ns - before.stamp_ns) as f64;
+        let fraction = since_ns / (first.stamp_ns - before.stamp_ns) as f64;
+        let between = |from, to| from + (to - from) * fraction;
+        let (q, qd) = (between(before.q, first.q), between(before.qd, first.qd));
         let moves = |r: &&JointReport| r.qd.max_abs() > STILL_RAD_S;
         let moving = after.iter().rposition(moves).map_or(0, |last| last + 1);
         let rest = after.get(moving).ok_or("the arm did not come to rest")?;
-        let ends_m = core::iter::once(&before).chain(&after[..=moving]);
-        let ends_m: Vec<_> = ends_m.map(|r| pole.attach_pose(&r.q).0).collect();
+        let poses = core::iter::once(&q).chain(after[..=moving].iter().map(|r| &r.q));
+        let ends_m: Vec<_> = poses.map(|q| pole.attach_pose(q).0).collect();
         let lengths_m = ends_m.windows(2).map(|pair| (pair[1] - pair[0]).norm());
         Ok(Self {
-            speed_m_s: tool_speed_m_s(&before.q, &before.qd, &pole.end_m()),
+            speed_m_s: tool_speed_m_s(&q, &qd, &pole.end_m()),
             time_s: 1e-9 * (rest.stamp_ns - told_ns) as f64,
             distance_m: lengths_m.sum(),
         })
@@ -140,10 +149,10 @@ mod tests {
             assert_eq!(caused(&end), [false, false], "{end:?}");
         }
     }
-    /// Joint 1 turns at a constant rate, told to stop at 0.1 s brakes evenly, and stands at 0.3 s.
+    /// Joint 1 turns at a constant rate; told to stop between two reports it brakes evenly.
     #[test]
     fn an_even_stop_takes_its_time_and_half_the_way() {
-        let (rate_rad_s, told_s, braking_s) = (0.8, 0.1, 0.2);
+        let (rate_rad_s, told_s, braking_s) = (0.8, 0.103, 0.2);
         let report = |k: u32| {
             let time_s = 0.004 * f64::from(k);
             let braked_s = (time_s - told_s).clamp(0.0, braking_s);
@@ -164,7 +173,7 @@ mod tests {
             }
         };
         let reports: Vec<_> = (0..200).map(report).collect();
-        let (told_ns, pole) = (100_000_000, Pole::default());
+        let (told_ns, pole) = ((1e9 * told_s) as u64, Pole::default());
         let stopping = Stopping::measured(&reports, told_ns, &pole).unwrap();
         let radius_m = pole.attach_pose(&START_POSE).0.xy().norm();
         assert!(
@@ -179,6 +188,8 @@ mod tests {
         );
         let moving = Stopping::measured(&reports[..60], told_ns, &pole);
         assert_eq!(moving, Err("the arm did not come to rest"));
+        let still = Stopping::measured(&reports, 500_000_000, &pole);
+        assert_eq!(still, Err("the arm stood still when it was stopped"));
         let untold = Stopping::measured(&reports[30..], told_ns, &pole);
         assert!(untold.is_err_and(|why| why.contains("before")));
     }

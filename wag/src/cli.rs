@@ -34,7 +34,7 @@ use std::path::PathBuf;
     about = "Wiggle and Go: identify a rope from one wiggle, plan a throw, execute it",
     after_help = "EXAMPLES:\n  \
         wag demo                                   everything, on a simulated robot\n  \
-        wag rig                                    a simulated xArm 7 for your own client\n  \
+        wag rig --command-port 5502                a simulated xArm 7 for your own client\n  \
         wag plan strike --rope rope.toml --target 1.0,0,0.4 --out plan.json\n  \
         wag check plan.json\n\n\
         Exit codes: 0 done, 1 ran and failed, 2 bad usage or input."

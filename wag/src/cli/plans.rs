@@ -50,7 +50,7 @@ pub struct PlanArgs {
     /// arm with this response, and its commands compensate for it.
     #[arg(long, value_name = "FILE")]
     pub arm_response: Option<PathBuf>,
-    /// Draw the reachable targets of this rope (SVG), and refuse one that is not.
+    /// Draw the reachable targets of this rope (SVG), and refuse a target that is not reachable.
     #[arg(long, value_name = "FILE")]
     pub reach: Option<PathBuf>,
 }
