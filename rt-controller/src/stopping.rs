@@ -75,7 +75,7 @@ pub fn fastest_swing(speed: &ArmedSpeed<'_>) -> Option<JointTrajectory> {
 /// How an arm came to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stopping {
-    /// Speed of the pole's end when the arm was told to stop (m/s).
+    /// Speed of the pole's end in the last report before the arm was told to stop (m/s).
     pub speed_m_s: f64,
     /// From then until every joint stood (s).
     pub time_s: f64,
@@ -104,8 +104,7 @@ impl Stopping {
         // Where it was in between: no part of the way before counts.
         let since_ns = (told_ns - before.stamp_ns) as f64;
         let fraction = since_ns / (first.stamp_ns - before.stamp_ns) as f64;
-        let between = |from, to| from + (to - from) * fraction;
-        let (q, qd) = (between(before.q, first.q), between(before.qd, first.qd));
+        let q = before.q + (first.q - before.q) * fraction;
         let moves = |r: &&JointReport| r.qd.max_abs() > STILL_RAD_S;
         let moving = after.iter().rposition(moves).map_or(0, |last| last + 1);
         let rest = after.get(moving).ok_or("the arm did not come to rest")?;
@@ -113,7 +112,7 @@ impl Stopping {
         let ends_m: Vec<_> = poses.map(|q| pole.attach_pose(q).0).collect();
         let lengths_m = ends_m.windows(2).map(|pair| (pair[1] - pair[0]).norm());
         Ok(Self {
-            speed_m_s: tool_speed_m_s(&q, &qd, &pole.end_m()),
+            speed_m_s: tool_speed_m_s(&q, &before.qd, &pole.end_m()),
             time_s: 1e-9 * (rest.stamp_ns - told_ns) as f64,
             distance_m: lengths_m.sum(),
         })
