@@ -1,5 +1,5 @@
-//! How an arm comes to rest when it is told to stop at full speed: the swing in which it is told,
-//! the two ways of telling it, and what its joint reports say of it.
+//! How an arm comes to rest from full speed: the swing that is stopped, the two methods of stopping
+//! it, and time and distance by its joint reports.
 
 use crate::armed_speed::ArmedSpeed;
 use crate::control::Motion;
@@ -19,7 +19,7 @@ const LASTS_S: [f64; 2] = [0.4, 12.0];
 /// A joint that is slower stands still (rad/s).
 const STILL_RAD_S: f64 = 1e-2;
 
-/// How an arm is told to stop.
+/// How an arm is stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopMethod {
     /// The controller brakes along its setpoints.
@@ -55,16 +55,16 @@ impl StopMethod {
 pub fn fastest_swing(speed: &ArmedSpeed<'_>) -> Option<JointTrajectory> {
     let lasting = |duration_s: f64| {
         let at = |k: usize| {
-            let part = k as f64 / (WAYPOINTS - 1) as f64;
+            let fraction = k as f64 / (WAYPOINTS - 1) as f64;
             let mut q = START_POSE;
             // Speed and acceleration are zero at both ends.
-            q[0] += SWING_RAD * part.powi(3) * (part * (6.0 * part - 15.0) + 10.0);
-            (duration_s * part, q)
+            q[0] += SWING_RAD * fraction.powi(3) * (fraction * (6.0 * fraction - 15.0) + 10.0);
+            (duration_s * fraction, q)
         };
         let (times_s, poses): (Vec<_>, Vec<_>) = (0..WAYPOINTS).map(at).unzip();
         let swing = JointTrajectory::new(&times_s, &poses).ok()?;
-        let kept = speed.limits.worst_violation(&swing).is_none();
-        (kept && speed.check(&Motion::Spline(swing)).is_ok()).then_some(swing)
+        let is_within = speed.limits.worst_violation(&swing).is_none();
+        (is_within && speed.check(&Motion::Spline(swing)).is_ok()).then_some(swing)
     };
     let [shortest_s, longest_s] = LASTS_S;
     let durations = (0..).map(|k| shortest_s * 1.05_f64.powi(k));
@@ -75,7 +75,7 @@ pub fn fastest_swing(speed: &ArmedSpeed<'_>) -> Option<JointTrajectory> {
 /// How an arm came to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stopping {
-    /// Speed of the pole's end in the last report before the arm was told to stop (m/s).
+    /// Speed of the pole's end in the last report before the stop was requested (m/s).
     pub speed_m_s: f64,
     /// From then until every joint stood (s).
     pub time_s: f64,
@@ -84,25 +84,26 @@ pub struct Stopping {
 }
 
 impl Stopping {
-    /// From the reports of an arm that was told to stop at `told_ns` (`CLOCK_MONOTONIC`).
+    /// From the reports of an arm whose stop was requested at `requested_ns` (`CLOCK_MONOTONIC`).
     ///
     /// # Errors
-    /// In words: nothing was reported before, or the arm still moved in the last report.
+    /// In words: nothing was reported before, the arm stood already, or it still moved in the last
+    /// report.
     pub fn measured(
         reports: &[JointReport],
-        told_ns: u64,
+        requested_ns: u64,
         pole: &Pole,
     ) -> Result<Self, &'static str> {
         let (before, after): (Vec<&JointReport>, Vec<_>) =
-            reports.iter().partition(|r| r.stamp_ns <= told_ns);
+            reports.iter().partition(|r| r.stamp_ns <= requested_ns);
         let before = before.last();
         let before = *before.ok_or("the arm reported no joints before it was stopped")?;
         let first = *after.first().ok_or("the arm did not come to rest")?;
         if before.qd.max_abs() <= STILL_RAD_S {
             return Err("the arm stood still when it was stopped");
         }
-        // Where it was in between: no part of the way before counts.
-        let since_ns = (told_ns - before.stamp_ns) as f64;
+        // Where it was in between: no path from before the request counts.
+        let since_ns = (requested_ns - before.stamp_ns) as f64;
         let fraction = since_ns / (first.stamp_ns - before.stamp_ns) as f64;
         let q = before.q + (first.q - before.q) * fraction;
         let moves = |r: &&JointReport| r.qd.max_abs() > STILL_RAD_S;
@@ -113,7 +114,7 @@ impl Stopping {
         let lengths_m = ends_m.windows(2).map(|pair| (pair[1] - pair[0]).norm());
         Ok(Self {
             speed_m_s: tool_speed_m_s(&q, &before.qd, &pole.end_m()),
-            time_s: 1e-9 * (rest.stamp_ns - told_ns) as f64,
+            time_s: 1e-9 * (rest.stamp_ns - requested_ns) as f64,
             distance_m: lengths_m.sum(),
         })
     }
@@ -148,15 +149,17 @@ mod tests {
             assert_eq!(caused(&end), [false, false], "{end:?}");
         }
     }
-    /// Joint 1 turns at a constant rate; told to stop between two reports it brakes evenly.
+
+    /// Joint 1 turns at a constant rate; its stop is requested between two reports and it brakes evenly.
     #[test]
-    fn an_even_stop_takes_its_time_and_half_the_way() {
-        let (rate_rad_s, told_s, braking_s) = (0.8, 0.103, 0.2);
+    fn an_even_stop_takes_its_time_and_half_the_path() {
+        let (rate_rad_s, requested_s, braking_s) = (0.8, 0.103, 0.2);
         let report = |k: u32| {
             let time_s = 0.004 * f64::from(k);
-            let braked_s = (time_s - told_s).clamp(0.0, braking_s);
+            let braked_s = (time_s - requested_s).clamp(0.0, braking_s);
             let (mut q, mut qd) = (START_POSE, arm_model::JointVector::ZERO);
-            let turned_s = time_s.min(told_s) + braked_s - braked_s.powi(2) / (2.0 * braking_s);
+            let turned_s =
+                time_s.min(requested_s) + braked_s - braked_s.powi(2) / (2.0 * braking_s);
             q[0] += rate_rad_s * turned_s;
             qd[0] = rate_rad_s * (1.0 - braked_s / braking_s);
             JointReport {
@@ -172,24 +175,24 @@ mod tests {
             }
         };
         let reports: Vec<_> = (0..200).map(report).collect();
-        let (told_ns, pole) = ((1e9 * told_s) as u64, Pole::default());
-        let stopping = Stopping::measured(&reports, told_ns, &pole).unwrap();
+        let (requested_ns, pole) = ((1e9 * requested_s) as u64, Pole::default());
+        let stopping = Stopping::measured(&reports, requested_ns, &pole).unwrap();
         let radius_m = pole.attach_pose(&START_POSE).0.xy().norm();
         assert!(
             (stopping.speed_m_s - rate_rad_s * radius_m).abs() < 1e-3,
             "{stopping:?}"
         );
         assert!((stopping.time_s - braking_s).abs() < 0.005, "{stopping:?}");
-        let way_m = 0.5 * stopping.speed_m_s * braking_s;
+        let path_m = 0.5 * stopping.speed_m_s * braking_s;
         assert!(
-            (stopping.distance_m - way_m).abs() < 1e-3,
-            "{stopping:?}, {way_m} m"
+            (stopping.distance_m - path_m).abs() < 1e-3,
+            "{stopping:?}, {path_m} m"
         );
-        let moving = Stopping::measured(&reports[..60], told_ns, &pole);
+        let moving = Stopping::measured(&reports[..60], requested_ns, &pole);
         assert_eq!(moving, Err("the arm did not come to rest"));
         let still = Stopping::measured(&reports, 500_000_000, &pole);
         assert_eq!(still, Err("the arm stood still when it was stopped"));
-        let untold = Stopping::measured(&reports[30..], told_ns, &pole);
+        let untold = Stopping::measured(&reports[30..], requested_ns, &pole);
         assert!(untold.is_err_and(|why| why.contains("before")));
     }
 }

@@ -27,9 +27,17 @@ pub(crate) fn built_in() -> Result<PlannerConfig, toml::de::Error> {
     toml::from_str(include_str!("../../../configs/planner/planner.toml"))
 }
 
+/// A number of a table; a dash where there is none.
+pub(super) fn number(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return "-".to_owned();
+    }
+    format!("{value:.digits$}")
+}
+
 /// Metres as centimetres of a table.
 pub(super) fn cm(m: f64) -> String {
-    format!("{:.2}", 100.0 * m)
+    number(100.0 * m, 2)
 }
 
 /// One run of a result.

@@ -87,11 +87,11 @@ pub(super) fn respaced(points: &[Pixel], like: &[Pixel]) -> Vec<Pixel> {
 }
 
 /// Place at a part of the points' count, drawn on beyond the last one: 0 first, 1 last.
-pub(super) fn at_fraction(points: &[Pixel], part: f64) -> Pixel {
+pub(super) fn at_fraction(points: &[Pixel], fraction: f64) -> Pixel {
     let last = points.len() - 1;
-    let place = part * last as f64;
+    let place = fraction * last as f64;
     if place >= last as f64 {
-        return from_end(points, (part - 1.0) * length(points)).0;
+        return from_end(points, (fraction - 1.0) * length(points)).0;
     }
     let before = place.max(0.0) as usize;
     between(points[before], points[before + 1], place - before as f64)

@@ -4,7 +4,7 @@
 use super::case::Case;
 use super::child::Mujoco;
 use super::kinds::{CONFIGURATIONS, RopeKind};
-use super::rows::{TABLE, row, told};
+use super::rows::{TABLE, row, with_refusals};
 use super::throwing::{Fate, Reality};
 use super::{AXIS, Experiment, Sequence};
 use crate::args::MujocoArgs;
@@ -72,5 +72,5 @@ pub(in crate::results) fn run(args: &MujocoArgs) -> Outcome<Option<Value>> {
         .flat_map(|kind| both(kind.name(), &|of| of == kind))
         .collect();
     rows.extend(both("all but the chain", &|of| of != RopeKind::Chain));
-    experiment.finish_rows(trials.len(), told(rows), AXIS, TABLE)
+    experiment.finish_rows(trials.len(), with_refusals(rows), AXIS, TABLE)
 }

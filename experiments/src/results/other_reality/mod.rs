@@ -18,7 +18,7 @@ use child::Mujoco;
 use clap::ValueEnum;
 use cli_output::{OrInput, Outcome};
 use experiments::trials::in_parallel;
-use rows::{TABLE, row, told};
+use rows::{TABLE, row, with_refusals};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use throwing::{Fate, Reality};
@@ -86,7 +86,7 @@ pub(super) fn run(args: &OtherRealityArgs) -> Outcome<Option<Value>> {
         let fates: Vec<&Fate> = with.map(|t| &t.fate).collect();
         row(&name(*channel), &fates)
     };
-    let rows = told(channels.iter().map(with).collect());
+    let rows = with_refusals(channels.iter().map(with).collect());
     let ropes = usize::try_from(ropes).unwrap_or(usize::MAX);
     experiment.finish_rows(ropes, rows, AXIS, TABLE)
 }

@@ -2,6 +2,7 @@
 
 use super::throwing::Fate;
 use crate::report::Column;
+use crate::results::experiment::{cm, number};
 use crate::results::picture::Curve;
 use experiments::trials::quantile;
 use serde::Serialize;
@@ -30,18 +31,6 @@ pub(super) struct Row {
     covered: f64,
     /// Median of those intervals' upper ends (m).
     forecast_high_m: f64,
-}
-
-/// A number; a dash where there is none.
-fn number(value: f64, digits: usize) -> String {
-    if value.is_nan() {
-        return "-".to_owned();
-    }
-    format!("{value:.digits$}")
-}
-
-fn cm(m: f64) -> String {
-    number(100.0 * m, 2)
 }
 
 /// Not a number for none.
@@ -117,8 +106,8 @@ pub(super) fn row(name: &str, fates: &[&Fate]) -> (Row, Curve) {
     (row, Curve::cm(name, misses_m(), None))
 }
 
-/// Rows and curves, with what was refused told first.
-pub(super) fn told(rows: Vec<(Row, Curve)>) -> (Vec<Row>, Vec<Curve>) {
+/// Rows and curves; prints what was refused.
+pub(super) fn with_refusals(rows: Vec<(Row, Curve)>) -> (Vec<Row>, Vec<Curve>) {
     for (row, _) in &rows {
         for why in &row.refusals {
             println!("{}: refused: {why}", row.name);
