@@ -26,14 +26,10 @@ fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
                 "joint {joint}: {text}"
             );
             let error = Errors::of(found.lag()?, &secrets[joint - 1]);
-            // A shared machine's wake-ups blur the measurement by up to two cycles. An overdamped
-            // joint's two poles and its dead time then trade against each other; how late it is
-            // in slow motion and where its amplitude falls they leave alone.
-            let follows = error.slow_delay_s < 6e-3 && error.bandwidth < 0.25;
-            assert!(
-                error.dead_time_s < 8e-3 && follows,
-                "joint {joint}: {error:?}\n{text}"
-            );
+            // A shared machine's wake-ups blur the measurement by up to two cycles: dead time
+            // and lag then trade against each other. What they predict of a throw must hold
+            // all the same, to 6 ms at its fastest, 15 % of the swing.
+            assert!(error.response < 0.15, "joint {joint}: {error:?}\n{text}");
             Some(error)
         })
         .collect();
