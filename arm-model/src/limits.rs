@@ -234,6 +234,13 @@ impl Limits {
         out
     }
 
+    /// Tool centre point of an arm at `q` (m, base frame). RT-safe.
+    #[must_use]
+    pub fn tool_centre_point_m(&self, q: &JointVector) -> Vector3<f64> {
+        let (p, r) = kinematics::flange_pose(q);
+        p + r * self.tcp_offset()
+    }
+
     /// Margin to the tool speed limit. The speed is no polynomial: it is
     /// sampled four times per cycle and its peak refined by a parabola.
     #[must_use]

@@ -119,7 +119,7 @@ fn a_film_reads_back_with_its_rate_and_the_rope_drawn_in() {
     let track = KeypointTrack {
         keypoints: 2,
         frames: vec![tracked(false), tracked(true), tracked(false)],
-        doubts: Vec::new(),
+        unconfirmed: Vec::new(),
     };
     let bytes = keypoint_film(&[grey(0), grey(1), grey(2)], &track).unwrap();
     let path = std::env::temp_dir().join(format!("film-{}.avi", std::process::id()));

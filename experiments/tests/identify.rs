@@ -8,7 +8,7 @@ use planner::identify;
 use planner::identify::{IdentifyError, IdentifyOptions, Method};
 use planner::observation::{Appearance, Observation, ObservedPoints};
 use planner::ropes::{outside_rope, random_rope, trial_rope};
-use planner::synthetic::{FilmNoise, FilmTiming, Filmed, Randomisation, film, side_camera};
+use planner::synthetic::{FilmNoise, FilmTiming, Randomisation, SyntheticFilm, film, side_camera};
 use planner::wiggle::WiggleConfig;
 use rope_sim::{AttachMotion, PlannedArm, PoseTrack};
 use shared_types::keypoints::TrackedFrame;
@@ -53,7 +53,7 @@ fn per_mass(rope: &RopeParams) -> [f64; 3] {
     ]
 }
 
-fn filmed(rope: &RopeParams, noise: &FilmNoise) -> Filmed {
+fn filmed(rope: &RopeParams, noise: &FilmNoise) -> SyntheticFilm {
     let timing = FilmTiming::default();
     film(rope, &wiggling_arm(), &side_camera(), 24, &timing, noise).unwrap()
 }
@@ -108,7 +108,7 @@ fn both_methods_find_planted_parameters_in_noise() {
         assert!(off_m < 4.0 * found.std_dev[1].unwrap());
         // The width of the rope was not seen, and motion does not reveal it.
         assert!(found.std_dev[4].is_none() && found.std_dev[8].is_none());
-        assert!(!found.out_of_distribution.is_outside(), "{found:?}");
+        assert!(!found.out_of_distribution.is_flagged(), "{found:?}");
     }
 }
 
@@ -162,7 +162,7 @@ fn a_rope_like_a_chain_is_noticed_with_the_reason() {
     let rope = outside_rope(1, 0);
     let filmed = rig.film(&rope, 1, 0).unwrap();
     let found = rig.fit(&filmed, 0, &quick(1, 2)).unwrap();
-    assert!(found.out_of_distribution.is_outside(), "{found:?}");
+    assert!(found.out_of_distribution.is_flagged(), "{found:?}");
     assert_eq!(found.method.as_str(), "hybrid-wide");
     assert!(!found.out_of_distribution.reasons.is_empty());
 }
@@ -271,7 +271,7 @@ fn true_keypoints_of(folder: &Path) -> KeypointTrack {
     KeypointTrack {
         keypoints,
         frames,
-        doubts: Vec::new(),
+        unconfirmed: Vec::new(),
     }
 }
 

@@ -3,7 +3,7 @@
 //! Knows nothing of the limiter: divided differences over the instants the setpoints were
 //! for, or over those at which they reached the arm.
 
-use arm_model::{JOINTS, JointVector, Limits, kinematics};
+use arm_model::{JOINTS, JointVector, Limits};
 use shared_types::MonotonicNs;
 use shared_types::ipc::{CommandKind, ControllerMode, CycleRecord, InputRecord};
 
@@ -78,10 +78,7 @@ impl Differences {
             let jerk = limits.jerk_max_rad_s3[j] + acceleration / period_s;
             check("jerk", third[j], jerk, self.rounding[2]);
         }
-        let tool = |q: &JointVector| {
-            let (p, r) = kinematics::flange_pose(q);
-            p + r * limits.tcp_offset()
-        };
+        let tool = |q: &JointVector| limits.tool_centre_point_m(q);
         let way_m = (tool(&q) - tool(&self.last[1].1)).norm();
         let speed_m_s = way_m / gap_s;
         let most = limits.tcp_speed_max_m_s + 2.0 * self.rounding[0];

@@ -8,7 +8,7 @@
 mod film;
 
 use camera_ingest::ImageFrame;
-use film::{Filmed, Take};
+use film::{RenderedFilm, Take};
 use hil_tests::{for_each_seed, quantile};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -42,7 +42,7 @@ fn busy_machine(seed: u64) -> impl FnMut(usize) -> bool {
 
 /// How a wiggle is filmed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Filming {
+enum Capture {
     Quiet,
     Busy,
     /// Row after row, as a ZED 2 in VGA.
@@ -50,10 +50,10 @@ enum Filming {
 }
 
 /// Films and tracks a wiggle and prints what came of it; that is an error if it is not good.
-fn outcome(seed: u64, filming: Filming) -> Result<(), String> {
+fn outcome(seed: u64, capture: Capture) -> Result<(), String> {
     let mut arrives = busy_machine(seed);
     let config = CameraConfig {
-        line_time_s: if filming == Filming::Rolling {
+        line_time_s: if capture == Capture::Rolling {
             26.1e-6
         } else {
             0.0
@@ -67,16 +67,16 @@ fn outcome(seed: u64, filming: Filming) -> Result<(), String> {
         still: STILL + (seed % 7) as f64 / 7.0,
         frames: FRAMES,
     };
-    let filmed = Filmed::of(&config, take, |index| {
-        filming != Filming::Busy || arrives(index)
+    let filmed = RenderedFilm::of(&config, take, |index| {
+        capture != Capture::Busy || arrives(index)
     });
     let found = filmed
         .track(&filmed.arm(0.0))
-        .map_err(|error| format!("seed {seed}, {filming:?}: {error}"))?;
+        .map_err(|error| format!("seed {seed}, {capture:?}: {error}"))?;
     let (mut errors_px, mut confident_px) = (Vec::new(), 0.0_f64);
-    let mut doubted = 0_u32;
+    let mut unconfirmed = 0_u32;
     for (index, frame) in found.track.frames.iter().enumerate() {
-        doubted += u32::from(frame.lost || frame.confidence.iter().all(|c| *c <= 0.5));
+        unconfirmed += u32::from(frame.lost || frame.confidence.iter().all(|c| *c <= 0.5));
         if frame.lost {
             continue;
         }
@@ -96,11 +96,11 @@ fn outcome(seed: u64, filming: Filming) -> Result<(), String> {
     let [median, p95] = [0.5, 0.95].map(|part| quantile(&errors_px, part));
     let lost = found.track.lost_fraction();
     let reported = format!(
-        "seed {seed} ({:.1} mm), {filming:?}: lost {:.1} %, unconfirmed {:.1} %, \
+        "seed {seed} ({:.1} mm), {capture:?}: lost {:.1} %, unconfirmed {:.1} %, \
          median {median:.2}, p95 {p95:.2}, most where sure {confident_px:.1} px",
         hidden_rope(seed).radius_m * 1e3,
         100.0 * lost,
-        100.0 * f64::from(doubted) / found.track.frames.len() as f64,
+        100.0 * f64::from(unconfirmed) / found.track.frames.len() as f64,
     );
     println!("{reported}");
     let good = lost <= 0.03 && median < 1.0 && p95 < 3.0 && confident_px < 20.0;
@@ -121,8 +121,8 @@ fn seeds() -> Vec<u64> {
 #[test]
 fn a_rope_is_not_lost_where_nothing_hides_it() {
     let seeds = seeds();
-    let outcomes = [Filming::Quiet, Filming::Busy, Filming::Rolling]
-        .map(|filming| for_each_seed(&seeds, |seed| outcome(seed, filming)));
+    let outcomes = [Capture::Quiet, Capture::Busy, Capture::Rolling]
+        .map(|capture| for_each_seed(&seeds, |seed| outcome(seed, capture)));
     let bad: Vec<String> = outcomes
         .into_iter()
         .flatten()
@@ -132,14 +132,14 @@ fn a_rope_is_not_lost_where_nothing_hides_it() {
 }
 
 /// A quiet film of a rope of usual thickness.
-fn usual(radii_m: Option<[f64; 2]>) -> Filmed {
+fn usual(radii_m: Option<[f64; 2]>) -> RenderedFilm {
     let take = Take {
         seed: 7,
         radii_m,
         still: STILL,
         frames: 180,
     };
-    Filmed::of(&CameraConfig::default(), take, |_| true)
+    RenderedFilm::of(&CameraConfig::default(), take, |_| true)
 }
 
 #[test]

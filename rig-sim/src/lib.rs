@@ -12,11 +12,11 @@
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 mod camera;
+mod capture;
 mod config;
 mod contact;
 mod error;
 mod exposure;
-mod filming;
 pub mod hidden;
 mod physics;
 mod record;
@@ -112,7 +112,7 @@ pub fn run_announced(
 /// The camera's part; without a camera it only waits.
 fn film(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Result<(), RigError> {
     if config.camera.enabled {
-        return filming::run(config, record, stop);
+        return capture::run(config, record, stop);
     }
     while !stop.load(Ordering::Acquire) {
         thread::sleep(Duration::from_millis(10));

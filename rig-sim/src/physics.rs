@@ -2,7 +2,7 @@
 
 use super::contact::touches;
 use super::error::RigError;
-use super::record::{Moment, Record};
+use super::record::{Record, Snapshot};
 use arm_model::{Cell, JointPiece, JointState};
 use rope_sim::LiveRope;
 use shared_types::{MonotonicNs, RopeParams};
@@ -36,8 +36,8 @@ pub(super) fn run(
             physics = Some(Physics::new(rope, cell, first)?);
         }
         if let Some(physics) = &mut physics {
-            let moments = rest.map(|sample| physics.follow(sample));
-            record.extend(moments.collect::<Result<_, _>>()?);
+            let snapshots = rest.map(|sample| physics.follow(sample));
+            record.extend(snapshots.collect::<Result<_, _>>()?);
         }
         clock::sleep_until(clock::now().plus_s(PAUSE_S));
     }
@@ -65,7 +65,7 @@ impl Physics {
     }
 
     /// Moves on to the next sample of the arm.
-    fn follow(&mut self, next: &JointSample) -> Result<Moment, RigError> {
+    fn follow(&mut self, next: &JointSample) -> Result<Snapshot, RigError> {
         let span_s = next.at.since_s(self.last.at);
         if span_s > GAP_S {
             return Err(RigError::Failed(format!(
@@ -90,7 +90,7 @@ impl Physics {
             ));
         }
         let radii_m = [self.rope.radius_m, self.rope.lead_radius_m];
-        Ok(Moment {
+        Ok(Snapshot {
             at: next.at,
             q: next.state.q,
             touched: touches(&nodes, radii_m, &next.state.q, &self.cell),
@@ -132,12 +132,15 @@ mod tests {
         .unwrap();
         let mut moved_m: f64 = 0.0;
         for ms in 1..=1500 {
-            let moment = physics.follow(&sample(ms)).unwrap();
+            let snapshot = physics.follow(&sample(ms)).unwrap();
             exact.advance(
                 &|t| cell.pole.attach_motion(&state(t)),
                 f64::from(ms) * 1e-3,
             );
-            let (got, want) = (moment.nodes.last().unwrap(), exact.nodes().last().unwrap());
+            let (got, want) = (
+                snapshot.nodes.last().unwrap(),
+                exact.nodes().last().unwrap(),
+            );
             assert!((got - want).norm() < 1e-5, "{ms} ms: {got} and {want}");
             moved_m = moved_m.max((got.x - 0.663).abs());
         }

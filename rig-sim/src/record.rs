@@ -16,7 +16,7 @@ const TIPS_KEPT: usize = 130_000;
 
 /// Arm and rope at one instant.
 #[derive(Debug, Clone)]
-pub(super) struct Moment {
+pub(super) struct Snapshot {
     pub(super) at: MonotonicNs,
     pub(super) q: JointVector,
     pub(super) nodes: Vec<Vector3<f64>>,
@@ -42,7 +42,7 @@ pub(super) struct Truth {
 
 #[derive(Debug, Default)]
 struct Kept {
-    ropes: VecDeque<Moment>,
+    ropes: VecDeque<Snapshot>,
     tips: VecDeque<Tip>,
     target_m: Option<Vector3<f64>>,
 }
@@ -56,22 +56,22 @@ pub(super) struct Record {
 
 impl Record {
     fn kept(&self) -> MutexGuard<'_, Kept> {
-        // A panic elsewhere leaves whole moments behind.
+        // A panic elsewhere leaves whole snapshots behind.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds moments, later than all before and in order.
-    pub(super) fn extend(&self, moments: Vec<Moment>) {
+    /// Adds snapshots, later than all before and in order.
+    pub(super) fn extend(&self, snapshots: Vec<Snapshot>) {
         let mut kept = self.kept();
-        for moment in moments {
-            if let Some(p) = moment.nodes.last() {
+        for snapshot in snapshots {
+            if let Some(p) = snapshot.nodes.last() {
                 kept.tips.push_back(Tip {
-                    at: moment.at,
+                    at: snapshot.at,
                     p_w_m: *p,
-                    touched: moment.touched,
+                    touched: snapshot.touched,
                 });
             }
-            kept.ropes.push_back(moment);
+            kept.ropes.push_back(snapshot);
         }
         let surplus = kept.ropes.len().saturating_sub(ROPES_KEPT);
         kept.ropes.drain(..surplus);
@@ -190,17 +190,17 @@ mod tests {
     /// A tip that passes (1, 0, 0) at 1 s with 5 m/s along y, 3 cm above it.
     fn passing() -> Record {
         let record = Record::default();
-        let moments = (0..3000).map(|ms: u32| {
+        let snapshots = (0..3000).map(|ms: u32| {
             let t_s = f64::from(ms) * 1e-3;
             let tip = Vector3::new(1.0, 5.0 * (t_s - 1.000_3), 0.03);
-            Moment {
+            Snapshot {
                 at: MonotonicNs(u64::from(ms) * MS),
                 q: JointVector::splat(t_s),
                 nodes: vec![Vector3::zeros(), tip],
                 touched: ms == 1500,
             }
         });
-        record.extend(moments.collect());
+        record.extend(snapshots.collect());
         record
     }
 

@@ -1,6 +1,6 @@
 //! A recording as a row of samples: what a person wants to know of each cycle.
 
-use arm_model::{JOINTS, JointVector, Limits, kinematics};
+use arm_model::{JOINTS, JointVector, Limits};
 use rt_controller::control::ControlSettings;
 use rt_controller::recording::{Item, LogError, LogReader, Read, RecordedCycle};
 use serde::Serialize;
@@ -235,12 +235,11 @@ impl Differentiator {
             self.before = None;
             return;
         }
-        let (p, r) = kinematics::flange_pose(&sample.q_c);
         let mut now = Sent {
             q: sample.q_c,
             moved: None,
             at_ns: sample.deadline_ns,
-            tool_m: p + r * limits.tcp_offset(),
+            tool_m: limits.tool_centre_point_m(&sample.q_c),
         };
         if let Some(before) = self.before {
             let step_s = MonotonicNs(now.at_ns).since_s(MonotonicNs(before.at_ns));

@@ -24,6 +24,7 @@
 //! ```
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
+mod clamp_motion;
 mod command_line;
 mod cycle_sample;
 mod cycles;
@@ -35,6 +36,7 @@ mod mcap_file;
 mod page;
 mod run;
 
+pub use clamp_motion::ClampMotion;
 pub use command_line::{CommandLine, quoted};
 pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 pub use cycles::{CYCLES_TABLE, Cycles};

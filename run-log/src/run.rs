@@ -92,6 +92,13 @@ impl Run {
         if of_mcap {
             bytes = replay_bytes(&bytes).with_context(|| format!("`{}`", path.display()))?;
         }
+        let is_named = path.extension().is_some_and(|e| e == "mcap" || e == "bin");
+        ensure!(
+            of_mcap || is_named,
+            "`{}` is no recording; name a run folder, or its file `{}`",
+            path.display(),
+            files::RUN
+        );
         // On a full disk the recorder leaves its file without a byte.
         if bytes.is_empty() && (of_mcap || path.ends_with(files::RUN)) {
             bail!(NoRecording(path));

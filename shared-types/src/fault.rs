@@ -67,9 +67,9 @@ fault_codes! {
     ReportStale = 23:
         "no joint reports come, or no longer; check the arm's report ports, then run the command again";
     TrackingError = 24:
-        "the arm is not where it was told to be; look for an obstacle, then run the command again";
+        "the arm is not at its setpoint; look for an obstacle, then run the command again";
     LateCycles = 25:
-        "the control thread was late by more than two cycles and the motion was slowed to rest; give it real-time priority and a core of its own";
+        "the control thread was late by more than two cycles; give it real-time priority and a core of its own";
     ReportFrozen = 26:
         "joint reports come but their values stand still; restart the arm's controller, then run the command again";
     ReportClock = 27:

@@ -101,8 +101,8 @@ pub struct KeypointTrack {
     /// The frames in order of time.
     pub frames: Vec<TrackedFrame>,
     /// Why the track should not be relied on; none where it may be.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub doubts: Vec<String>,
+    #[serde(default, alias = "doubts", skip_serializing_if = "Vec::is_empty")]
+    pub unconfirmed: Vec<String>,
 }
 
 /// Why a keypoint track is refused: what is wrong, and in which frame.
@@ -118,7 +118,7 @@ impl KeypointTrack {
         Some(Self {
             keypoints,
             frames: frames.map(|f| f.tracked(first_stamp_ns)).collect(),
-            doubts: Vec::new(),
+            unconfirmed: Vec::new(),
         })
     }
 
@@ -179,7 +179,7 @@ mod tests {
         KeypointTrack {
             keypoints: 3,
             frames: vec![frame(0.0), frame(0.5)],
-            doubts: Vec::new(),
+            unconfirmed: Vec::new(),
         }
     }
 

@@ -1,10 +1,10 @@
 //! The words every process of the system agrees on.
 //!
-//! Data flows one way through the house: camera -> keypoints -> parameters ->
-//! plan -> setpoints -> record. This crate holds the types that cross a door
-//! between two of those rooms and the shared-memory services ([`ipc`]) through which processes meet.
+//! Data flows one way: camera -> keypoints -> parameters -> plan -> setpoints -> record. This
+//! crate holds the types that one of these stages hands to the next, and the shared-memory
+//! services ([`ipc`]) through which processes meet.
 //!
-//! It is *not* a place for algorithms of one room only, for files, or for
+//! It is *not* a place for algorithms of one stage only, for files, or for
 //! sockets.
 //!
 //! Conventions: SI units and radians everywhere; the unit comes last in the

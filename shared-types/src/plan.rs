@@ -97,6 +97,9 @@ pub struct Plan {
     pub task: Task,
     /// Target in the world (m).
     pub target_m: [f64; 3],
+    /// Where the simulated tip passes instead (m), of a throw corrected by an earlier miss.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub aim_m: Option<[f64; 3]>,
     /// Rope the throw was planned for.
     pub rope: RopeParams,
     /// Cell it was planned for; plans of older versions do not tell it.
@@ -127,8 +130,8 @@ pub struct Plan {
     #[serde(default)]
     pub arm_response: Option<String>,
     /// Why the track that its rope was identified from should not be relied on.
-    #[serde(default)]
-    pub doubts: Vec<String>,
+    #[serde(default, alias = "doubts")]
+    pub unconfirmed: Vec<String>,
     /// Simulations used.
     pub simulations: u32,
     /// Candidates drawn again because they broke a limit.

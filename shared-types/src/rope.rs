@@ -273,6 +273,10 @@ pub struct RopePosterior {
     pub ambiguities: Vec<Ambiguity>,
     /// Factor by which variances were widened because parts of the film disagree.
     pub inflation: f64,
+    /// Root mean square distance of the film's keypoints from the fitted rope, at its depth
+    /// (m): the tracker's noise, and what the model does not explain.
+    #[serde(default)]
+    pub residual_m: f64,
 }
 
 /// Noise of the keypoints in one direction, as found.
@@ -313,7 +317,7 @@ pub struct OutOfDistribution {
 impl OutOfDistribution {
     /// Whether the rope is not one of those the ranges know.
     #[must_use]
-    pub fn is_outside(&self) -> bool {
+    pub fn is_flagged(&self) -> bool {
         self.score >= self.limit
     }
 }

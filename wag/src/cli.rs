@@ -26,6 +26,9 @@ use shared_types::Task;
 use std::net::IpAddr;
 use std::path::PathBuf;
 
+/// Heading of what every command takes, below its own options.
+const GLOBAL: &str = "Global options";
+
 /// Identify a rope from one wiggle, plan a throw, execute it.
 #[derive(Debug, Parser)]
 #[command(
@@ -41,18 +44,18 @@ use std::path::PathBuf;
 )]
 pub struct Cli {
     /// Print one JSON object on standard output and nothing else there.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = GLOBAL)]
     pub json: bool,
     /// Seed of everything random; a command without chance takes it and ignores it.
-    #[arg(long, global = true, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, global = true, help_heading = GLOBAL, allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
     /// The cell: the pole on the arm, and what stands around it (TOML, as
     /// configs/cell/lab.toml); it contains only what differs. Default: that of the
     /// run, else the effective one.
-    #[arg(long, global = true, value_name = "FILE")]
+    #[arg(long, global = true, help_heading = GLOBAL, value_name = "FILE")]
     pub cell: Option<PathBuf>,
     /// Log more to standard error (-v info, -vv debug).
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    #[arg(short, long, global = true, help_heading = GLOBAL, action = clap::ArgAction::Count)]
     pub verbose: u8,
     #[command(subcommand)]
     pub command: Command,
@@ -329,6 +332,8 @@ pub enum PlanCommand {
     Lob(PlanArgs),
     /// The rope comes to hang over a wall.
     Drape(PlanArgs),
+    /// The last strike corrected by its miss: the same throw, hardly changed.
+    Again(AgainArgs),
 }
 
 #[derive(Debug, Args)]

@@ -8,7 +8,7 @@ pub enum ArmStartError {
     /// A port below 1024 without the right to use it.
     #[error(
         "no permission to listen on port {port} of {bind}: run as root, set \
-         net.ipv4.ip_unprivileged_port_start to {port} or less, or choose another port"
+         net.ipv4.ip_unprivileged_port_start to {port} or less, or choose another port (`wag rig --command-port 5502`)"
     )]
     Permission {
         /// Address.

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::corners::CornerDetector;
-use super::extrinsics::Sighted;
+use super::extrinsics::Correspondence;
 use crate::source::{SourceError, StereoSource};
 
 /// Corners both images must see for a picture to count.
@@ -125,7 +125,7 @@ impl Board {
         &self,
         source: &mut dyn StereoSource,
         frames: usize,
-    ) -> Result<Vec<Sighted>, BoardError> {
+    ) -> Result<Vec<Correspondence>, BoardError> {
         let detector = self.detector().map_err(|reason| BoardError::File {
             path: PathBuf::from("(board)"),
             reason,
@@ -136,11 +136,11 @@ impl Board {
             let frame = source.read(index)?;
             let left = detector.corners(&frame.left());
             let right = detector.corners(&frame.right());
-            let both: Vec<Sighted> = left
+            let both: Vec<Correspondence> = left
                 .iter()
                 .filter_map(|(id, pixel)| {
                     let other = right.iter().find(|(other, _)| other == id)?.1;
-                    Some(Sighted {
+                    Some(Correspondence {
                         p_w_m: self.corner_w_m(*id),
                         pixels: [*pixel, other],
                     })

@@ -10,7 +10,7 @@ use shared_types::StereoCamera;
 
 /// A point known in the world and seen by both images.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sighted {
+pub struct Correspondence {
     /// Place in the world (m).
     pub p_w_m: Vector3<f64>,
     /// Raw pixels in the left and the right image.
@@ -60,7 +60,10 @@ const MAX_RESIDUAL_PX: f64 = 1.5;
 ///
 /// # Errors
 /// Too few points, points on a line, or no pose that fits.
-pub fn solve(camera: &StereoCamera, points: &[Sighted]) -> Result<Extrinsics, ExtrinsicsError> {
+pub fn solve(
+    camera: &StereoCamera,
+    points: &[Correspondence],
+) -> Result<Extrinsics, ExtrinsicsError> {
     if points.len() < MIN_POINTS {
         return Err(ExtrinsicsError(format!(
             "{} points are seen in both images, at least {MIN_POINTS} are needed",
@@ -118,7 +121,7 @@ pub fn solve(camera: &StereoCamera, points: &[Sighted]) -> Result<Extrinsics, Ex
 
 /// What is left in the images with the pose the camera has.
 #[must_use]
-pub fn residual(camera: &StereoCamera, points: &[Sighted]) -> Residual {
+pub fn residual(camera: &StereoCamera, points: &[Correspondence]) -> Residual {
     let mut squares = 0.0;
     let (mut worst_px, mut gaps) = (0.0_f64, 0.0);
     for point in points {
@@ -142,7 +145,7 @@ pub fn residual(camera: &StereoCamera, points: &[Sighted]) -> Residual {
 }
 
 /// Differences of expected and seen pixels; far off behind the camera.
-fn errors(camera: &StereoCamera, point: &Sighted) -> [f64; 4] {
+fn errors(camera: &StereoCamera, point: &Correspondence) -> [f64; 4] {
     const FAR_PX: f64 = 1e4;
     let [left, right] = [
         camera.project_left(&point.p_w_m),
@@ -157,7 +160,7 @@ fn errors(camera: &StereoCamera, point: &Sighted) -> [f64; 4] {
     ]
 }
 
-fn square_sum(camera: &StereoCamera, points: &[Sighted]) -> f64 {
+fn square_sum(camera: &StereoCamera, points: &[Correspondence]) -> f64 {
     let all = points.iter().flat_map(|p| errors(camera, p));
     all.map(|e| e * e).sum()
 }
@@ -173,7 +176,10 @@ fn moved(camera: &StereoCamera, step: &Vector6<f64>) -> StereoCamera {
 }
 
 /// `J^T J` and `J^T r`, the slopes by central differences.
-fn normal_equations(camera: &StereoCamera, points: &[Sighted]) -> (Matrix6<f64>, Vector6<f64>) {
+fn normal_equations(
+    camera: &StereoCamera,
+    points: &[Correspondence],
+) -> (Matrix6<f64>, Vector6<f64>) {
     const STEP: f64 = 1e-6;
     let shifted: Vec<[StereoCamera; 2]> = (0..6)
         .map(|k| {
@@ -201,7 +207,7 @@ fn normal_equations(camera: &StereoCamera, points: &[Sighted]) -> (Matrix6<f64>,
 }
 
 /// The camera put so that the points it triangulates lie on the known ones.
-fn lay_on(camera: &StereoCamera, points: &[Sighted]) -> Option<StereoCamera> {
+fn lay_on(camera: &StereoCamera, points: &[Correspondence]) -> Option<StereoCamera> {
     let (seen_c, known_w): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = points
         .iter()
         .filter_map(|p| {

@@ -135,7 +135,7 @@ impl Preview {
     /// A frame came that is none, or none of this camera.
     pub fn unfit(&mut self, sequence: u64, stamp_ns: u64) -> PreviewFrame {
         self.count(sequence, stamp_ns);
-        self.begin_anew("the camera's frames do not fit its calibration");
+        self.restart("the camera's frames do not fit its calibration");
         self.reported(PreviewState::Unfit, sequence, stamp_ns, None)
     }
 
@@ -158,7 +158,7 @@ impl Preview {
             }
             Err(reason) => {
                 tracing::debug!(%reason, "joint reports");
-                self.begin_anew("the joint reports are no motion");
+                self.restart("the joint reports are no motion");
                 None
             }
         }
@@ -182,7 +182,7 @@ impl Preview {
             }
             Err((what, reason)) => {
                 tracing::info!(%reason, "no rope found");
-                self.begin_anew(what);
+                self.restart(what);
             }
         }
     }
@@ -192,11 +192,11 @@ impl Preview {
         self.seen += 1;
         if let Some(last) = self.last {
             if sequence <= last.sequence || stamp_ns <= last.stamp_ns {
-                self.begin_anew("the camera restarted");
+                self.restart("the camera restarted");
             } else {
                 self.skipped += sequence - last.sequence - 1;
                 if stamp_ns - last.stamp_ns > PAUSE_NS {
-                    self.begin_anew("no frame was seen for a second");
+                    self.restart("no frame was seen for a second");
                 }
             }
         }
@@ -204,7 +204,7 @@ impl Preview {
     }
 
     /// Forgets scene and rope.
-    fn begin_anew(&mut self, why: &'static str) {
+    fn restart(&mut self, why: &'static str) {
         if std::mem::take(&mut self.begun) {
             self.restarts = self.restarts.wrapping_add(1);
             tracing::info!("restarts: {why}");
@@ -215,18 +215,18 @@ impl Preview {
     fn track(&mut self, frame: ImageFrame) -> (PreviewState, Option<TrackedFrame>) {
         let size = [frame.width_px, frame.height_px];
         if size != [self.camera.width_px, self.camera.height_px].map(|px| px as usize) {
-            self.begin_anew("a frame has another size");
+            self.restart("a frame has another size");
             return (PreviewState::Unfit, None);
         }
         if !self.arm.is_known_at(frame.stamp_ns) {
-            self.begin_anew("the arm's pose is unknown");
+            self.restart("the arm's pose is unknown");
             return (PreviewState::NoArm, None);
         }
         if self.arm.take_jump() {
-            self.begin_anew("the arm is elsewhere than its path leads to");
+            self.restart("the arm is elsewhere than its path leads to");
         }
         if self.arm.is_full() {
-            self.begin_anew("the search took too long");
+            self.restart("the search took too long");
         }
         self.begun = true;
         let stamp_ns = frame.stamp_ns;
@@ -249,7 +249,7 @@ impl Preview {
                 if seen.is_some() && !is_lost {
                     return (PreviewState::Following, seen);
                 }
-                self.begin_anew(if is_lost {
+                self.restart(if is_lost {
                     "the rope is lost"
                 } else {
                     "the rope cannot be simulated further"

@@ -72,7 +72,7 @@ pub(super) fn track(
         lost_fraction: result.track.lost_fraction(),
         appearance,
         ms_per_frame,
-        doubts: result.track.doubts,
+        unconfirmed: result.track.unconfirmed,
     })
 }
 
@@ -141,6 +141,7 @@ pub(super) fn score(
     Ok(CameraEvent::Scored(ScoreResult {
         closest_m: found.closest_m,
         interval_m: found.interval_m,
+        miss_m: found.miss_m,
         time_s: found.time_s,
         target_m: found.target_m,
     }))

@@ -14,12 +14,12 @@ mod tests;
 
 use blob::chroma_of_rgb;
 use nalgebra::Vector3;
-use path::{LocalPath, Sighting, mark_small};
+use path::{Detection, LocalPath, mark_small};
 use scene::{Scene, Target, blob_error, read_sized};
 use serde::Serialize;
 use shared_types::StereoCamera;
 
-use crate::calib::extrinsics::Sighted;
+use crate::calib::extrinsics::Correspondence;
 use crate::source::StereoSource;
 pub use error::ScoreError;
 
@@ -30,6 +30,8 @@ pub struct Score {
     pub closest_m: f64,
     /// What two standard errors of tip and target allow, least and most (m).
     pub interval_m: [f64; 2],
+    /// Tip minus target then, in the world (m).
+    pub miss_m: [f64; 3],
     /// When it was, from the first frame's start of exposure (s).
     pub time_s: f64,
     /// Centre of the target in the world (m).
@@ -38,7 +40,7 @@ pub struct Score {
     pub tip_path: Vec<(f64, [f64; 3])>,
 }
 
-/// Sightings of the tip needed.
+/// Detections of the tip needed.
 const MIN_SIGHTINGS: usize = 6;
 /// Chroma below which a colour counts as grey.
 const MIN_CHROMA: f64 = 25.0;
@@ -65,7 +67,7 @@ pub fn score(
     check_colour("target", target_rgb)?;
     let scene = Scene::learn(source, camera)?;
     let target = scene.target(target_rgb)?;
-    let mut sightings = Vec::new();
+    let mut detections = Vec::new();
     let (mut start_ns, mut end_s) = (0, 0.0);
     for index in 0..frames {
         let frame = read_sized(source, index, camera)?;
@@ -74,21 +76,21 @@ pub fn score(
         }
         let since_s = frame.0.stamp_ns.saturating_sub(start_ns) as f64 * 1e-9;
         end_s = since_s;
-        let near = sightings.last().copied();
+        let near = detections.last().copied();
         let images = [&frame.left(), &frame.right()];
         if let Some(tip) = scene.tip(images, tip_rgb, &target, near, since_s) {
-            sightings.push(tip);
+            detections.push(tip);
         }
     }
-    if sightings.len() < MIN_SIGHTINGS {
+    if detections.len() < MIN_SIGHTINGS {
         return Err(ScoreError::NotSeen {
             what: "tip",
-            seen: sightings.len(),
+            seen: detections.len(),
             least: MIN_SIGHTINGS,
         });
     }
-    mark_small(&mut sightings);
-    Ok(closest(&sightings, end_s, &target, camera))
+    mark_small(&mut detections);
+    Ok(closest(&detections, end_s, &target, camera))
 }
 
 /// A colour that chroma can find.
@@ -113,34 +115,34 @@ pub fn sight_lead(
     camera: &StereoCamera,
     rgb: [u8; 3],
     shown: &[(usize, Vector3<f64>)],
-) -> Result<Vec<Sighted>, ScoreError> {
+) -> Result<Vec<Correspondence>, ScoreError> {
     check_colour("lead", rgb)?;
     let scene = Scene::learn(source, camera)?;
     let mut sighted = Vec::new();
     for &(frame, p_w_m) in shown {
         let both = read_sized(source, frame, camera)?;
         if let Some(pixels) = scene.largest([&both.left(), &both.right()], rgb) {
-            sighted.push(Sighted { p_w_m, pixels });
+            sighted.push(Correspondence { p_w_m, pixels });
         }
     }
     Ok(sighted)
 }
 
 /// Minimises the distance over continuous time; the last frame began at `end_s`.
-fn closest(sightings: &[Sighting], end_s: f64, target: &Target, camera: &StereoCamera) -> Score {
+fn closest(detections: &[Detection], end_s: f64, target: &Target, camera: &StereoCamera) -> Score {
     let to_world = |p: Vector3<f64>| camera.p_w_cam_m + camera.r_w_cam * p;
     let mut tip_path = Vec::new();
     let mut best: Option<(f64, f64, LocalPath)> = None;
-    for index in 0..sightings.len() {
-        let Some(path) = LocalPath::around(sightings, index, blob_error(camera)) else {
+    for index in 0..detections.len() {
+        let Some(path) = LocalPath::around(detections, index, blob_error(camera)) else {
             continue;
         };
         tip_path.push((path.t_s, to_world(path.at(path.t_s)).into()));
         // Each path speaks for the time up to half way to its neighbours.
         let half_way =
-            |other: Option<&Sighting>| other.map_or(path.t_s, |o| f64::midpoint(o.t_s, path.t_s));
-        let from = half_way(index.checked_sub(1).and_then(|i| sightings.get(i)));
-        let to = half_way(sightings.get(index + 1));
+            |other: Option<&Detection>| other.map_or(path.t_s, |o| f64::midpoint(o.t_s, path.t_s));
+        let from = half_way(index.checked_sub(1).and_then(|i| detections.get(i)));
+        let to = half_way(detections.get(index + 1));
         for step in 0..=STEPS_PER_FRAME {
             let t = from + (to - from) * f64::from(step) / f64::from(STEPS_PER_FRAME);
             let distance = (path.at(t) - target.point_c).norm();
@@ -149,17 +151,17 @@ fn closest(sightings: &[Sighting], end_s: f64, target: &Target, camera: &StereoC
             }
         }
     }
-    let (closest_m, time_s, interval_m) = best.map_or(
-        (f64::INFINITY, 0.0, [0.0, f64::INFINITY]),
-        |(d, t, path)| {
-            let [low_m, high_m] = interval(&path, t, target);
-            let nearer_m = path.speed_at(t) * unseen_s(sightings, t, end_s, camera);
-            (d, t, [(low_m - nearer_m).max(0.0), high_m])
-        },
-    );
+    let nowhere = (f64::INFINITY, [f64::INFINITY; 3], 0.0, [0.0, f64::INFINITY]);
+    let (closest_m, miss_m, time_s, interval_m) = best.map_or(nowhere, |(d, t, path)| {
+        let [low_m, high_m] = interval(&path, t, target);
+        let nearer_m = path.speed_at(t) * unseen_s(detections, t, end_s, camera);
+        let miss = camera.r_w_cam * (path.at(t) - target.point_c);
+        (d, miss.into(), t, [(low_m - nearer_m).max(0.0), high_m])
+    });
     Score {
         closest_m,
         interval_m,
+        miss_m,
         time_s,
         target_m: to_world(target.point_c).into(),
         tip_path,
@@ -168,9 +170,9 @@ fn closest(sightings: &[Sighting], end_s: f64, target: &Target, camera: &StereoC
 
 /// How long the film goes on without the tip where it was nearest when it was first or
 /// last seen (s): it may have come nearer unseen. Zero where the way goes on.
-fn unseen_s(sightings: &[Sighting], nearest_s: f64, end_s: f64, camera: &StereoCamera) -> f64 {
+fn unseen_s(detections: &[Detection], nearest_s: f64, end_s: f64, camera: &StereoCamera) -> f64 {
     let bottom = f64::from(camera.height_px);
-    match sightings {
+    match detections {
         [first, ..] if nearest_s <= first.t_s => (first.t_s - camera.row_time_s(bottom)).max(0.0),
         [.., last] if nearest_s >= last.t_s => (end_s - last.t_s).max(0.0),
         _ => 0.0,

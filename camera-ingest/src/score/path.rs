@@ -1,17 +1,17 @@
-//! The tip's way through space from single sightings.
+//! The tip's way through space from single detections.
 //!
-//! Along the image the sightings are good (a few mm), in depth they are not
+//! Along the image the detections are good (a few mm), in depth they are not
 //! (65 mm a pixel at 1.7 m). So the image path is a cubic over 5 frames, the
 //! inverse depth - proportional to disparity - a quadratic over 11 frames with
-//! Cauchy weights against half-hidden leads. Sightings known to be cut by something
+//! Cauchy weights against half-hidden leads. Detections known to be cut by something
 //! else hardly count: the path goes on from the clear ones around them, and its error
 //! grows with the way to them.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// One stereo sighting in the left optical frame.
+/// One stereo detection in the left optical frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sighting {
+pub(super) struct Detection {
     /// Middle of the exposure of the row it was seen in (s).
     pub(super) t_s: f64,
     /// `x/z`, `y/z`.
@@ -23,40 +23,40 @@ pub(super) struct Sighting {
     /// Radius of a disc of the area seen (px).
     pub(super) radius_px: f64,
     /// How many times less sure it is than a clear one: 1, more if it is cut.
-    pub(super) doubt: f64,
+    pub(super) spread: f64,
 }
 
-impl Sighting {
+impl Detection {
     /// Notes that a part of it may be hidden: its centre may be off by a good part of
     /// its radius, where a clear one's is off by a tenth of a pixel or two.
     pub(super) fn cut(&mut self) {
         /// A small blob's centre is no better known when it is cut.
         const MIN_PX: f64 = 3.0;
-        self.doubt = self.radius_px.max(MIN_PX);
+        self.spread = self.radius_px.max(MIN_PX);
     }
 }
 
 /// Clear frames for the image path and for the depth.
 const IMAGE_FRAMES: usize = 5;
 const DEPTH_FRAMES: usize = 11;
-/// A sighting smaller than this part of those around it is cut.
+/// A detection smaller than this part of those around it is cut.
 const MIN_AREA: f64 = 0.8;
 
-/// Marks sightings as cut whose area is smaller than that of the ones around them.
-pub(super) fn mark_small(sightings: &mut [Sighting]) {
-    let areas: Vec<f64> = sightings.iter().map(|s| s.area_m2).collect();
-    for (index, sighting) in sightings.iter_mut().enumerate() {
+/// Marks detections as cut whose area is smaller than that of the ones around them.
+pub(super) fn mark_small(detections: &mut [Detection]) {
+    let areas: Vec<f64> = detections.iter().map(|s| s.area_m2).collect();
+    for (index, detection) in detections.iter_mut().enumerate() {
         let from = index.saturating_sub(DEPTH_FRAMES / 2);
         let to = (index + DEPTH_FRAMES / 2 + 1).min(areas.len());
         let mut around = areas[from..to].to_vec();
         around.sort_by(f64::total_cmp);
-        if sighting.area_m2 < MIN_AREA * around[around.len() / 2] {
-            sighting.cut();
+        if detection.area_m2 < MIN_AREA * around[around.len() / 2] {
+            detection.cut();
         }
     }
 }
 
-/// Smooth path around one sighting.
+/// Smooth path around one detection.
 #[derive(Debug, Clone)]
 pub(super) struct LocalPath {
     /// Time about which the polynomials are written (s).
@@ -77,24 +77,24 @@ pub(super) struct PathError {
 }
 
 impl LocalPath {
-    /// Fits around sighting `index`; `None` with fewer than four sightings. `least` are
-    /// the errors of a clear sighting at best: few may happen to agree better.
-    pub(super) fn around(sightings: &[Sighting], index: usize, least: PathError) -> Option<Self> {
-        if sightings.len() < 4 {
+    /// Fits around detection `index`; `None` with fewer than four detections. `least` are
+    /// the errors of a clear detection at best: few may happen to agree better.
+    pub(super) fn around(detections: &[Detection], index: usize, least: PathError) -> Option<Self> {
+        if detections.len() < 4 {
             return None;
         }
-        let t_s = sightings[index].t_s;
-        let points = |count: usize, value: fn(&Sighting) -> f64| -> Vec<Point> {
-            window(sightings, index, count)
+        let t_s = detections[index].t_s;
+        let points = |count: usize, value: fn(&Detection) -> f64| -> Vec<Point> {
+            window(detections, index, count)
                 .iter()
                 .map(|s| Point {
                     t_s: s.t_s - t_s,
                     value: value(s),
-                    doubt: s.doubt,
+                    spread: s.spread,
                 })
                 .collect()
         };
-        let mut areas_m2: Vec<f64> = window(sightings, index, DEPTH_FRAMES)
+        let mut areas_m2: Vec<f64> = window(detections, index, DEPTH_FRAMES)
             .iter()
             .map(|s| s.area_m2)
             .collect();
@@ -138,26 +138,26 @@ impl LocalPath {
     }
 }
 
-/// The sightings nearest to `index` of which `count` are clear, or all there are
+/// The detections nearest to `index` of which `count` are clear, or all there are
 /// within twice as many.
-fn window(sightings: &[Sighting], index: usize, count: usize) -> &[Sighting] {
-    let clear = |s: &&Sighting| s.doubt <= 1.0;
+fn window(detections: &[Detection], index: usize, count: usize) -> &[Detection] {
+    let clear = |s: &&Detection| s.spread <= 1.0;
     let (mut from, mut to) = (index, index + 1);
     let enough =
-        |part: &[Sighting]| part.iter().filter(clear).count() >= count || part.len() >= 2 * count;
-    while !enough(&sightings[from..to]) && to - from < sightings.len() {
+        |part: &[Detection]| part.iter().filter(clear).count() >= count || part.len() >= 2 * count;
+    while !enough(&detections[from..to]) && to - from < detections.len() {
         // The nearer of the two next ones, in time.
         let before = from
             .checked_sub(1)
-            .map(|i| sightings[index].t_s - sightings[i].t_s);
-        let after = sightings.get(to).map(|s| s.t_s - sightings[index].t_s);
+            .map(|i| detections[index].t_s - detections[i].t_s);
+        let after = detections.get(to).map(|s| s.t_s - detections[index].t_s);
         if after.is_none_or(|after| before.is_some_and(|before| before < after)) {
             from -= 1;
         } else {
             to += 1;
         }
     }
-    &sightings[from..to]
+    &detections[from..to]
 }
 
 /// A value at a time relative to the middle of a window.
@@ -165,7 +165,7 @@ fn window(sightings: &[Sighting], index: usize, count: usize) -> &[Sighting] {
 struct Point {
     t_s: f64,
     value: f64,
-    doubt: f64,
+    spread: f64,
 }
 
 /// A polynomial and the covariance of its coefficients.
@@ -210,18 +210,18 @@ fn fit(points: &[Point], degree: usize, min_scale: f64, min_error: f64) -> Optio
         .iter()
         .map(|p| powers(p.t_s / unit_s, count))
         .collect();
-    let mut weights: Vec<f64> = points.iter().map(|p| 1.0 / p.doubt).collect();
+    let mut weights: Vec<f64> = points.iter().map(|p| 1.0 / p.spread).collect();
     let mut result = None;
     for _ in 0..12 {
         let a = DMatrix::from_fn(points.len(), count, |r, c| weights[r] * rows[r][c]);
         let b = DVector::from_fn(points.len(), |r, _| weights[r] * points[r].value);
         let inverse = (a.transpose() * &a).pseudo_inverse(1e-12).ok()?;
         let coefficients = a.svd(true, true).solve(&b, 1e-12).ok()?;
-        // In units of a clear sighting's error.
+        // In units of a clear detection's error.
         let residual: Vec<f64> = points
             .iter()
             .zip(&rows)
-            .map(|(p, row)| (p.value - coefficients.dot(row)) / p.doubt)
+            .map(|(p, row)| (p.value - coefficients.dot(row)) / p.spread)
             .collect();
         let mut sorted: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
         sorted.sort_by(f64::total_cmp);
@@ -239,7 +239,7 @@ fn fit(points: &[Point], degree: usize, min_scale: f64, min_error: f64) -> Optio
         // Coefficients take their share of the scatter away.
         let freedom = (total - count as f64).max(1.0);
         for ((w, t), p) in weights.iter_mut().zip(&trust).zip(points) {
-            *w = t / p.doubt;
+            *w = t / p.spread;
         }
         result = Some(Fit {
             unit_s,
@@ -259,21 +259,21 @@ mod tests {
         inverse_depth: 3e-3,
     };
 
-    /// Fifteen clear sightings: ray and inverse depth at a time.
-    fn clear(place: impl Fn(f64) -> ([f64; 2], f64)) -> Vec<Sighting> {
-        let sighting = |i: u8| {
+    /// Fifteen clear detections: ray and inverse depth at a time.
+    fn clear(place: impl Fn(f64) -> ([f64; 2], f64)) -> Vec<Detection> {
+        let detection = |i: u8| {
             let t_s = f64::from(i) / 60.0;
             let (ray, inverse_depth) = place(t_s);
-            Sighting {
+            Detection {
                 t_s,
                 ray,
                 inverse_depth,
                 area_m2: 1e-3,
                 radius_px: 6.0,
-                doubt: 1.0,
+                spread: 1.0,
             }
         };
-        (0..15).map(sighting).collect()
+        (0..15).map(detection).collect()
     }
 
     #[test]
@@ -282,33 +282,33 @@ mod tests {
             let ray = [0.1 + 2.0 * t, 0.2 - 1.5 * t + 4.0 * t * t];
             (ray, 0.6 + 0.3 * t - t * t)
         };
-        let mut sightings = clear(truth);
-        sightings[6].inverse_depth += 0.08;
-        let path = LocalPath::around(&sightings, 7, MIN_ERROR).unwrap();
+        let mut detections = clear(truth);
+        detections[6].inverse_depth += 0.08;
+        let path = LocalPath::around(&detections, 7, MIN_ERROR).unwrap();
         let ([x, y], w) = truth(0.12);
         let p = path.at(0.12);
         assert!(
             (p - Vector3::new(x / w, y / w, 1.0 / w)).norm() < 0.004,
             "{p}"
         );
-        assert!(LocalPath::around(&sightings[..3], 1, MIN_ERROR).is_none());
+        assert!(LocalPath::around(&detections[..3], 1, MIN_ERROR).is_none());
     }
 
     #[test]
     fn cut_sightings_are_bridged_and_make_the_path_less_sure() {
         let clear = clear(|t| ([0.1 + 2.0 * t + 3.0 * t * t, 0.2], 0.6));
         let mut half = clear.clone();
-        for sighting in &mut half[6..9] {
-            sighting.ray[0] += 0.02;
-            sighting.inverse_depth += 0.05;
-            sighting.area_m2 /= 2.0;
+        for detection in &mut half[6..9] {
+            detection.ray[0] += 0.02;
+            detection.inverse_depth += 0.05;
+            detection.area_m2 /= 2.0;
         }
         let t_s = 7.0 / 60.0;
         let whole = LocalPath::around(&clear, 7, MIN_ERROR).unwrap();
         let misled = LocalPath::around(&half, 7, MIN_ERROR).unwrap();
         assert!((misled.at(t_s) - whole.at(t_s)).norm() > 0.02);
         mark_small(&mut half);
-        let cut: Vec<usize> = (0..15).filter(|&i| half[i].doubt > 1.0).collect();
+        let cut: Vec<usize> = (0..15).filter(|&i| half[i].spread > 1.0).collect();
         assert_eq!(cut, [6, 7, 8]);
         let bridged = LocalPath::around(&half, 7, MIN_ERROR).unwrap();
         let off_m = (bridged.at(t_s) - whole.at(t_s)).norm();

@@ -5,7 +5,7 @@ use shared_types::StereoCamera;
 
 use super::blob::{Behind, Blob, BlobMap, Chroma, chroma_of_rgb};
 use super::error::ScoreError;
-use super::path::{PathError, Sighting};
+use super::path::{Detection, PathError};
 use crate::frame::{ImageFrame, StereoFrame};
 use crate::source::StereoSource;
 
@@ -183,9 +183,9 @@ impl<'a> Scene<'a> {
         images: [&ImageFrame; 2],
         rgb: [u8; 3],
         target: &Target,
-        before: Option<Sighting>,
+        before: Option<Detection>,
         since_s: f64,
-    ) -> Option<Sighting> {
+    ) -> Option<Detection> {
         let pairs = self.pairs_in(images, rgb);
         let away = |p: &Pair| match before {
             // Large and near: a stray pixel far off must not win.
@@ -200,18 +200,18 @@ impl<'a> Scene<'a> {
             .min_by(|a, b| away(a).total_cmp(&away(b)))?;
         let row = f64::midpoint(pair.left.centre[1], pair.right.centre[1]);
         let m_per_px = pair.point_c.z / self.camera.left.fx;
-        let mut sighting = Sighting {
+        let mut detection = Detection {
             t_s: since_s + self.camera.row_time_s(row),
             ray: self.camera.left.undistort(pair.left.centre),
             inverse_depth: 1.0 / pair.point_c.z,
             area_m2: pair.left.area_px * m_per_px * m_per_px,
             radius_px: (pair.left.area_px / std::f64::consts::PI).sqrt(),
-            doubt: 1.0,
+            spread: 1.0,
         };
         if target.touches(&pair) {
-            sighting.cut();
+            detection.cut();
         }
-        Some(sighting)
+        Some(detection)
     }
 }
 

@@ -3,9 +3,9 @@
 use shared_types::keypoints::TrackedFrame;
 
 /// Confidence below which a keypoint is unconfirmed.
-pub(super) const DOUBT: f64 = 0.5;
+pub(super) const UNCONFIRMED: f64 = 0.5;
 /// Part of a film's keypoints that may be unconfirmed.
-const MAX_DOUBTED: f64 = 0.25;
+const MAX_UNCONFIRMED: f64 = 0.25;
 /// How far the tip weight must stand out from what surrounds it, in the middle frame.
 const MIN_TIP: f64 = 0.25;
 /// Part of the rope that the second image must show where the first one says.
@@ -24,34 +24,34 @@ pub(super) struct Confirmation {
 
 impl Confirmation {
     /// Why these keypoints should not be relied on; empty where they may be.
-    pub(super) fn doubts(&self, frames: &[TrackedFrame]) -> Vec<String> {
+    pub(super) fn unconfirmed(&self, frames: &[TrackedFrame]) -> Vec<String> {
         let all = frames.iter().flat_map(|f| &f.confidence);
-        let doubted = all.clone().filter(|c| **c < DOUBT).count() as f64;
-        let doubted = doubted / all.count().max(1) as f64;
+        let weak = all.clone().filter(|c| **c < UNCONFIRMED).count() as f64;
+        let weak = weak / all.count().max(1) as f64;
         let percent = |part: f64| (100.0 * part).round();
-        let mut doubts = Vec::new();
-        if doubted > MAX_DOUBTED {
-            doubts.push(format!(
+        let mut unconfirmed = Vec::new();
+        if weak > MAX_UNCONFIRMED {
+            unconfirmed.push(format!(
                 "{} % of the keypoints have little evidence (at most {} % may)",
-                percent(doubted),
-                percent(MAX_DOUBTED)
+                percent(weak),
+                percent(MAX_UNCONFIRMED)
             ));
         }
         if self.tip < MIN_TIP {
-            doubts.push(format!(
+            unconfirmed.push(format!(
                 "the rope's end is not confirmed: its tip weight stands out by {:.2} from what \
                  surrounds it (at least {MIN_TIP})",
                 self.tip
             ));
         }
         if let Some(part) = self.second_image.filter(|part| *part < MIN_CONFIRMED) {
-            doubts.push(format!(
+            unconfirmed.push(format!(
                 "the second image shows {} % of the rope where the first one says (at least {} %)",
                 percent(part),
                 percent(MIN_CONFIRMED)
             ));
         }
-        doubts
+        unconfirmed
     }
 }
 
@@ -60,28 +60,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_doubt_is_named() {
-        let doubts = |doubted: usize, tip, second_image| {
+    fn each_reason_is_named() {
+        let unconfirmed = |weak: usize, tip, second_image| {
             let mut confidence = vec![0.9; 100];
-            confidence[..doubted].fill(0.4);
+            confidence[..weak].fill(0.4);
             let frame = TrackedFrame {
                 t_s: 0.0,
                 points: vec![[0.0; 2]; 100],
                 confidence,
                 lost: false,
             };
-            Confirmation { tip, second_image }.doubts(&[frame])
+            Confirmation { tip, second_image }.unconfirmed(&[frame])
         };
-        assert!(doubts(2, 0.8, Some(0.95)).is_empty());
-        assert!(doubts(2, 0.8, None).is_empty());
-        let named = doubts(40, 0.1, Some(0.2));
+        assert!(unconfirmed(2, 0.8, Some(0.95)).is_empty());
+        assert!(unconfirmed(2, 0.8, None).is_empty());
+        let named = unconfirmed(40, 0.1, Some(0.2));
         let words = [
             "40 % of the keypoints",
             "end is not confirmed",
             "20 % of the rope",
         ];
-        for (doubt, word) in named.iter().zip(words) {
-            assert!(doubt.contains(word), "{named:?}");
+        for (reason, word) in named.iter().zip(words) {
+            assert!(reason.contains(word), "{named:?}");
         }
         assert_eq!(named.len(), 3);
     }

@@ -8,8 +8,8 @@
 //! ([`TrackResult::by_points`]).
 
 mod confirmation;
-mod covered;
 mod explain;
+mod inpainting;
 mod plane;
 mod point_tracker;
 mod refusal;

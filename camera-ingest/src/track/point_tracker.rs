@@ -92,7 +92,7 @@ impl TrackResult {
                 first: tracked.iter().position(|f| f.lost).unwrap_or(0),
             });
         }
-        self.track.doubts = self.confirmation.doubts(tracked);
+        self.track.unconfirmed = self.confirmation.unconfirmed(tracked);
         Ok(self)
     }
 }

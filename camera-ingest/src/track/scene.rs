@@ -1,6 +1,6 @@
 //! The scene without the rope, and how noisy it is.
 
-use super::covered;
+use super::inpainting;
 use crate::frame::ImageFrame;
 use crate::vectors::widest;
 
@@ -73,7 +73,7 @@ fn median(frames: &[&ImageFrame]) -> ImageFrame {
 /// The median over some frames without what covers the scene in most of them.
 fn uncovered(mut median: ImageFrame, frames: &[&ImageFrame]) -> ImageFrame {
     let lit: Vec<_> = frames.iter().map(|f| (*f, gain(&median, f))).collect();
-    covered::uncover(&mut median, &lit);
+    inpainting::uncover(&mut median, &lit);
     median
 }
 

@@ -8,7 +8,7 @@ use cli_output::{Machine, OrInput, Outcome, Stage};
 use experiments::trials::TrialRig;
 use planner::identify::{IdentifyOptions, Method};
 use planner::ropes::trial_rope;
-use planner::synthetic::Filmed;
+use planner::synthetic::SyntheticFilm;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -38,7 +38,7 @@ fn measure(
     rig: &TrialRig,
     args: &BenchArgs,
     (method, limit_wall_s): (&'static str, f64),
-    mut identify: impl FnMut(&Filmed, u64) -> Outcome<f64>,
+    mut identify: impl FnMut(&SyntheticFilm, u64) -> Outcome<f64>,
 ) -> Outcome<Row> {
     // Ropes and runs of each.
     let (ropes, repeats) = if args.quick { (1, 1) } else { (5, 3) };
@@ -82,7 +82,7 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     stage.say("network measured");
     let fit = |options: IdentifyOptions| {
         let rig = &rig;
-        move |filmed: &Filmed, index: u64| {
+        move |filmed: &SyntheticFilm, index: u64| {
             let found = rig.fit(filmed, index, &options).or_failed()?;
             Ok(f64::from(found.simulations))
         }

@@ -11,7 +11,7 @@ use camera_ingest::{USUAL_KEYPOINTS, load_camera, open_video, track};
 use cli_output::table::numbers;
 use cli_output::{OrInput, Outcome, Stage};
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
-use run_log::files::{read_joints, read_pose};
+use run_log::files::{self, read_joints, read_pose};
 use serde_json::{Map, Value, json};
 use shared_types::StereoCamera;
 use std::path::Path;
@@ -93,7 +93,7 @@ pub(super) fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
              camera.toml and pose.csv or joints.csv"
         )
     })?;
-    let camera = load_camera(&folder.join("camera.toml")).or_input()?;
+    let camera = load_camera(&folder.join(files::CAMERA)).or_input()?;
     let mut video = open_video(folder, None).or_input()?;
     let motion = motion(folder)?;
     let stage = Stage::begin("bench");

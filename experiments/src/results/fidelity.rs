@@ -16,7 +16,7 @@ use experiments::trials::{KEYPOINTS, TrialRig, mean};
 use planner::PlannerConfig;
 use planner::plan::{PlanOptions, PlanRequest};
 use planner::ropes::trial_rope;
-use planner::synthetic::{FilmTiming, Filmed, RopeFilm, project};
+use planner::synthetic::{FilmTiming, RopeFilm, SyntheticFilm, project};
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, PlannedArm, Precision, SimOptions, SimulateError, roll_out,
 };
@@ -177,7 +177,7 @@ fn paths(
 }
 
 /// Films a rope with extras and the errors of recording `index` of `seed`.
-fn film(rig: &TrialRig, rope: &RealRope, seed: u64, index: u64) -> anyhow::Result<Filmed> {
+fn film(rig: &TrialRig, rope: &RealRope, seed: u64, index: u64) -> anyhow::Result<SyntheticFilm> {
     let duration_s = rig.motion.duration_s();
     let paths = paths(&rope.params, &rig.motion, duration_s, FILM_RATE_HZ)?;
     let points = paths.iter().flatten();

@@ -62,6 +62,11 @@ impl RobustTrial {
                 FORECAST,
                 seed,
             );
+            // These ropes are thrown in the very model that they are planned with.
+            let drawn = PosteriorEnsemble {
+                discrepancy_m: 0.0,
+                ..drawn
+            };
             let planned = thrower.plan_for(&found.params, SEARCHES, drawn)?;
             Ok(Foreseen {
                 strike: thrower.throw(&planned)?,

@@ -62,7 +62,7 @@ fn print(summary: &SysidSummary) {
     println!(
         "\n{} ropes of the ranges, {:.1} % flagged as out of distribution, residual {:.2} px, {:.0} simulations each",
         summary.trials,
-        100.0 * summary.taken_for_outside,
+        100.0 * summary.flagged_fraction,
         summary.residual_px,
         summary.simulations
     );

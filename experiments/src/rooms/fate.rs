@@ -22,13 +22,13 @@ pub(super) struct Tracked {
     pub(super) scene: Scene,
     pub(super) fate: Fate,
     /// Why the tracker would not rely on it.
-    pub(super) doubts: Vec<String>,
+    pub(super) unconfirmed: Vec<String>,
 }
 
 impl Tracked {
     /// Whether the tracker followed the rope, and relies on that.
     pub(super) fn is_followed(&self) -> bool {
-        matches!(&self.fate, Fate::Tracked(score) if score.follows()) && self.doubts.is_empty()
+        matches!(&self.fate, Fate::Tracked(score) if score.follows()) && self.unconfirmed.is_empty()
     }
 
     /// One line about it.
@@ -50,7 +50,7 @@ impl Tracked {
                 s.lost,
                 s.wrong,
                 s.frames,
-                self.doubts
+                self.unconfirmed
                     .iter()
                     .map(|d| format!("; unconfirmed: {d}"))
                     .collect::<String>()

@@ -70,7 +70,7 @@ pub(super) fn write(folder: &Path, seed: u64, kind: Kind) -> anyhow::Result<Scen
     let camera = rendered.setting.calibrated.clone();
     write_factory_conf(&folder.join("camera.conf"), &camera, VideoMode::Vga)?;
     write_camera_toml(
-        &folder.join("camera.toml"),
+        &folder.join(files::CAMERA),
         &camera,
         VideoMode::Vga,
         Path::new("camera.conf"),

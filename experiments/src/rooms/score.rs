@@ -116,7 +116,7 @@ mod tests {
         let track = KeypointTrack {
             keypoints: 5,
             frames: (0..100).map(frame).collect(),
-            doubts: Vec::new(),
+            unconfirmed: Vec::new(),
         };
         Score::of(&track, &vec![truth.clone(); 100])
     }

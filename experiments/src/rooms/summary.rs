@@ -35,7 +35,7 @@ impl Row {
             match &film.fate {
                 Fate::Refused(_) => refused += 1,
                 Fate::Tracked(score) if score.misleads() => wrong += 1,
-                Fate::Tracked(_) => flagged += usize::from(!film.doubts.is_empty()),
+                Fate::Tracked(_) => flagged += usize::from(!film.unconfirmed.is_empty()),
             }
         }
         Self {

@@ -41,7 +41,7 @@ fn percent([value, low, high]: [f64; 3]) -> String {
 /// Tracks the film in a folder as `wag track` does: the only call of the tracker here.
 fn follow(folder: &Path) -> anyhow::Result<Result<KeypointTrack, TrackError>> {
     let mut video = open_video(&folder.join("video.avi"), None)?;
-    let camera = load_camera(&folder.join("camera.toml"))?;
+    let camera = load_camera(&folder.join(files::CAMERA))?;
     let joints = files::read_joints(&folder.join("joints_measured.csv"))?;
     let arm = MeasuredArm::new(&joints.times_s, &joints.q, Pole::default())?;
     let images = read_film(&mut video)?;
@@ -78,13 +78,13 @@ fn judge(folder: &Path, seed: u64, kind: Kind) -> anyhow::Result<Tracked> {
         scene.kind,
         scene.seed
     );
-    let (fate, doubts) = match follow(folder)? {
+    let (fate, unconfirmed) = match follow(folder)? {
         Ok(track) => {
             let fate = Score::of(&track, &truth(folder)?).map_or_else(
                 || Fate::Refused("the rope is lost in all frames".to_owned()),
                 Fate::Tracked,
             );
-            (fate, track.doubts)
+            (fate, track.unconfirmed)
         }
         Err(refusal) => {
             let reason = format!("{:#}", anyhow::Error::new(refusal));
@@ -95,7 +95,7 @@ fn judge(folder: &Path, seed: u64, kind: Kind) -> anyhow::Result<Tracked> {
         program: program()?,
         scene,
         fate,
-        doubts,
+        unconfirmed,
     })
 }
 

@@ -11,7 +11,9 @@ pub use summary::{PAPER, ParameterRow, RatioRow, SysidSummary, summarise};
 use planner::observation::{Observation, ObservedPoints};
 use planner::phi::PhiNet;
 use planner::ropes::TRIAL_SALT;
-use planner::synthetic::{FilmTiming, Filmed, KeypointLayout, Randomisation, film, side_camera};
+use planner::synthetic::{
+    FilmTiming, KeypointLayout, Randomisation, SyntheticFilm, film, side_camera,
+};
 
 use anyhow::Context;
 use planner::identify::{IdentifyError, IdentifyOptions, Method};
@@ -82,7 +84,12 @@ impl TrialRig {
     }
 
     /// Films a rope with the errors of recording `index` of `seed`.
-    pub fn film(&self, rope: &RopeParams, seed: u64, index: u64) -> Result<Filmed, SimulateError> {
+    pub fn film(
+        &self,
+        rope: &RopeParams,
+        seed: u64,
+        index: u64,
+    ) -> Result<SyntheticFilm, SimulateError> {
         let noise = self.randomisation.draw(seed ^ TRIAL_SALT, index);
         let timing = FilmTiming::default();
         let layout = match self.points {
@@ -95,7 +102,7 @@ impl TrialRig {
 
     /// A film with its camera and motion.
     #[must_use]
-    pub fn observation<'a>(&'a self, filmed: &'a Filmed) -> Observation<'a> {
+    pub fn observation<'a>(&'a self, filmed: &'a SyntheticFilm) -> Observation<'a> {
         Observation {
             track: &filmed.track,
             points: self.points,
@@ -108,7 +115,7 @@ impl TrialRig {
     /// Identifies the rope of a film.
     pub fn fit(
         &self,
-        filmed: &Filmed,
+        filmed: &SyntheticFilm,
         index: u64,
         options: &IdentifyOptions,
     ) -> Result<RopeEstimate, IdentifyError> {
@@ -174,7 +181,7 @@ pub fn run(
             interval_90: found.posterior.interval_90,
             residual_px: found.residual_px,
             out_of_distribution: found.out_of_distribution.score,
-            outside: found.out_of_distribution.is_outside(),
+            outside: found.out_of_distribution.is_flagged(),
             method: found.method.to_string(),
             simulations: found.simulations,
         })

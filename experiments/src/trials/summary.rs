@@ -61,7 +61,7 @@ pub struct SysidSummary {
     /// Rows of ratios.
     pub ratios: Vec<RatioRow>,
     /// Fraction of the ropes, all of the ranges, that were taken for ropes outside.
-    pub taken_for_outside: f64,
+    pub flagged_fraction: f64,
     /// Median distance of the fit to the keypoints (px).
     pub residual_px: f64,
     /// Mean number of simulations.
@@ -112,7 +112,7 @@ pub fn summarise(trials: &[Trial]) -> SysidSummary {
             ratio("damping c / stiffness k", |v| v[2] / v[3]),
             ratio("lead mass / mass per length", |v| v[6] / v[5]),
         ],
-        taken_for_outside: mean(trials.iter().map(|t| f64::from(u8::from(t.outside)))),
+        flagged_fraction: mean(trials.iter().map(|t| f64::from(u8::from(t.outside)))),
         residual_px: quantile(trials.iter().map(|t| t.residual_px), 0.5),
         simulations: mean(trials.iter().map(|t| f64::from(t.simulations))),
     }
@@ -140,7 +140,7 @@ mod tests {
         let length = &s.parameters[1];
         assert!((length.mean_error - 0.0275).abs() < 1e-12);
         assert_eq!(length.coverage, 0.5);
-        assert_eq!(s.taken_for_outside, 0.5);
+        assert_eq!(s.flagged_fraction, 0.5);
         // A common factor leaves ratios alone; a bending stiffness has a length in it.
         assert!(s.ratios[2].median < 1e-12 && s.ratios[3].p90 < 1e-12);
         assert!(s.ratios[0].p90 < 1e-12);

@@ -16,12 +16,12 @@
 //! [`RigLog::causes`], what the arm really got and did in
 //! [`RigLog::arm_events`] and [`RigLog::truth`].
 
+mod environment;
 mod feeds;
 mod network;
-mod surroundings;
 
+pub use environment::Environment;
 pub use network::VirtualStream;
-pub use surroundings::Surroundings;
 
 use crate::scenario;
 use arm_model::joint::START_POSE;
@@ -119,27 +119,27 @@ impl RigLog {
 }
 
 /// Controller and arm in virtual time. What surrounds the controller, and what
-/// has happened so far, is [`Surroundings`].
+/// has happened so far, is [`Environment`].
 #[derive(Debug)]
 pub struct VirtualRig {
     config: VirtualRigConfig,
     driver: CycleDriver<TcpLink<VirtualStream>>,
-    around: Surroundings,
+    around: Environment,
     /// By how much the next wake-ups come late (ns).
     late_ns: VecDeque<u64>,
     motions: u64,
 }
 
 impl core::ops::Deref for VirtualRig {
-    type Target = Surroundings;
+    type Target = Environment;
 
-    fn deref(&self) -> &Surroundings {
+    fn deref(&self) -> &Environment {
         &self.around
     }
 }
 
 impl core::ops::DerefMut for VirtualRig {
-    fn deref_mut(&mut self) -> &mut Surroundings {
+    fn deref_mut(&mut self) -> &mut Environment {
         &mut self.around
     }
 }
@@ -151,7 +151,7 @@ impl VirtualRig {
         let arm = ArmEndpoint::new(config.arm.clone(), START);
         Self {
             driver: CycleDriver::new(config.control(), START.0),
-            around: Surroundings::new(arm, START, config.delay_s),
+            around: Environment::new(arm, START, config.delay_s),
             late_ns: VecDeque::new(),
             motions: 0,
             config,

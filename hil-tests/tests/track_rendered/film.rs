@@ -25,7 +25,7 @@ pub(crate) struct Take {
 }
 
 /// A film as a tracker looks at it.
-pub(crate) struct Filmed {
+pub(crate) struct RenderedFilm {
     /// Left images.
     pub(crate) frames: Vec<ImageFrame>,
     /// Right images of some of them.
@@ -40,7 +40,7 @@ pub(crate) struct Filmed {
     until_s: f64,
 }
 
-impl Filmed {
+impl RenderedFilm {
     /// Films a wiggle; `keep` says which frames arrive after the first one.
     pub(crate) fn of(
         config: &CameraConfig,

@@ -7,7 +7,7 @@
 use super::camera_pose::CORRECTIONS;
 use super::coordinates::{CAMERA, CLOCK, Coordinates, Point, nearest_links, simulated_rope};
 use super::error::IdentifyError;
-use super::film::{Fidelity, Film, Instant, Sighting, is_finite, sample_s};
+use super::film::{Detection, Fidelity, Film, Instant, is_finite, sample_s};
 use crate::workers::map_in_order;
 use nalgebra::{SMatrix, SVector};
 use rope_sim::Rollout;
@@ -15,12 +15,12 @@ use shared_types::RopeParams;
 
 /// Distance given to a candidate that cannot be compared (px).
 pub(super) const INVISIBLE_PX: f64 = 1e4;
-/// Deviation of one sighting against which the camera's prior is weighed (px): large,
-/// because neighbouring sightings err together.
+/// Deviation of one detection against which the camera's prior is weighed (px): large,
+/// because neighbouring detections err together.
 const SIGHTING_PX: f64 = 20.0;
 /// Step of the camera's corrections (m, rad).
 const STEP: f64 = 1e-4;
-/// Distance beyond which a sighting counts as an outlier (Huber, px).
+/// Distance beyond which a detection counts as an outlier (Huber, px).
 const OUTLIER_PX: f64 = 8.0;
 
 type Slopes = SMatrix<f64, 2, CORRECTIONS>;
@@ -37,7 +37,7 @@ pub(super) struct Compared {
 /// Compares candidates with one film.
 pub(super) struct Comparer<'a> {
     film: &'a Film<'a>,
-    sightings: Vec<(Sighting, Slopes)>,
+    detections: Vec<(Detection, Slopes)>,
     inverse: SMatrix<f64, CORRECTIONS, CORRECTIONS>,
 }
 
@@ -52,10 +52,10 @@ impl<'a> Comparer<'a> {
             let weight = (SIGHTING_PX / coordinates.prior_std[CAMERA + i]).powi(2);
             if i == j { weight } else { 0.0 }
         });
-        let mut sightings = Vec::new();
-        for sighting in film.grid(Fidelity::Coarse).cells.iter().flatten() {
+        let mut detections = Vec::new();
+        for detection in film.grid(Fidelity::Coarse).cells.iter().flatten() {
             // Where the pixel's ray meets the plane of the clamp.
-            let (origin, ray) = camera.left_ray(sighting.pixel);
+            let (origin, ray) = camera.left_ray(detection.pixel);
             let forward = ray.dot(&camera.r_w_cam.column(2));
             let p = origin + ray * (depth_m / forward.max(0.1));
             let Some(here) = nominal.project(&p) else {
@@ -66,12 +66,12 @@ impl<'a> Comparer<'a> {
                     .project(&p)
                     .map_or(0.0, |moved| (moved[axis] - here[axis]) / STEP)
             });
-            normal += slopes.tr_mul(&slopes) * sighting.weight;
-            sightings.push((*sighting, slopes));
+            normal += slopes.tr_mul(&slopes) * detection.weight;
+            detections.push((*detection, slopes));
         }
         Self {
             film,
-            sightings,
+            detections,
             inverse: normal.try_inverse().unwrap_or_else(SMatrix::zeros),
         }
     }
@@ -97,32 +97,32 @@ impl<'a> Comparer<'a> {
 
     /// The distance (px), and the camera's corrections there.
     fn one(&self, x: &Point, rollout: &Rollout) -> Option<(f64, [f64; CORRECTIONS])> {
-        if !is_finite(rollout) || self.sightings.is_empty() {
+        if !is_finite(rollout) || self.detections.is_empty() {
             return None;
         }
         let period_s = sample_s(Fidelity::Coarse);
         let samples = rollout.nodes.frames();
-        let mut residuals = Vec::with_capacity(self.sightings.len());
+        let mut residuals = Vec::with_capacity(self.detections.len());
         let mut pull = SVector::<f64, CORRECTIONS>::zeros();
-        for (sighting, slopes) in &self.sightings {
-            let now = Instant::new(sighting.time_s - x[CLOCK], period_s, samples);
-            let p = now.position(&rollout.nodes, sighting.along);
+        for (detection, slopes) in &self.detections {
+            let now = Instant::new(detection.time_s - x[CLOCK], period_s, samples);
+            let p = now.position(&rollout.nodes, detection.along);
             let [u, v] = self.film.observation.camera.project_left(&p)?;
-            let r = SVector::<f64, 2>::new(u - sighting.pixel[0], v - sighting.pixel[1]);
-            pull += slopes.tr_mul(&r) * sighting.weight;
+            let r = SVector::<f64, 2>::new(u - detection.pixel[0], v - detection.pixel[1]);
+            pull += slopes.tr_mul(&r) * detection.weight;
             residuals.push(r);
         }
         let correction = -self.inverse * pull;
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (r, (sighting, slopes)) in residuals.iter().zip(&self.sightings) {
+        for (r, (detection, slopes)) in residuals.iter().zip(&self.detections) {
             let d = (r + slopes * correction).norm();
             let loss = if d <= OUTLIER_PX {
                 d * d
             } else {
                 OUTLIER_PX * (2.0 * d - OUTLIER_PX)
             };
-            sum += sighting.weight * loss;
-            weights += sighting.weight;
+            sum += detection.weight * loss;
+            weights += detection.weight;
         }
         let distance_px = (sum / f64::max(weights, 1e-9)).sqrt();
         distance_px

@@ -1,4 +1,4 @@
-//! The observation as a grid of sightings, and the rope simulated under its motion.
+//! The observation as a grid of detections, and the rope simulated under its motion.
 
 use super::camera_pose::Viewer;
 use super::clock::{ClockWindow, clock_window};
@@ -32,7 +32,7 @@ pub(super) enum Fidelity {
 
 /// One keypoint of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sighting {
+pub(super) struct Detection {
     /// Camera time at which its image row was exposed (s).
     pub(super) time_s: f64,
     /// Place along the rope: 0 the clamp, 1 the lead's centre.
@@ -43,13 +43,13 @@ pub(super) struct Sighting {
     pub(super) weight: f64,
 }
 
-/// Sightings by frame and keypoint; those that cannot be used are `None`.
+/// Detections by frame and keypoint; those that cannot be used are `None`.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
     /// Keypoints per frame.
     pub(super) keypoints: usize,
     /// Frame by frame.
-    pub(super) cells: Vec<Option<Sighting>>,
+    pub(super) cells: Vec<Option<Detection>>,
     /// Whether a frame is the next one after its predecessor in the grid.
     pub(super) follows: Vec<bool>,
 }
@@ -63,13 +63,13 @@ impl Grid {
         confidence_min: f64,
     ) -> Self {
         let keypoints = observation.track.keypoints as f64;
-        let sighting = |frame: &TrackedFrame, i: usize| {
+        let detection = |frame: &TrackedFrame, i: usize| {
             let (pixel, confidence) = (frame.points[i], frame.confidence[i]);
             let along = match observation.points {
                 ObservedPoints::ArcLength => i as f64 / (keypoints - 1.0),
                 ObservedPoints::LinkCentres => (i as f64 + 0.5) / keypoints,
             };
-            (confidence >= confidence_min && confidence > 0.0).then(|| Sighting {
+            (confidence >= confidence_min && confidence > 0.0).then(|| Detection {
                 time_s: frame.t_s + observation.camera.row_time_s(pixel[1]),
                 along,
                 pixel,
@@ -83,7 +83,7 @@ impl Grid {
             keypoints: chosen.len(),
             cells: frames
                 .iter()
-                .flat_map(|f| chosen.iter().map(|i| sighting(f, *i)))
+                .flat_map(|f| chosen.iter().map(|i| detection(f, *i)))
                 .collect(),
             follows,
         }
@@ -138,7 +138,7 @@ impl<'a> Film<'a> {
         }
     }
 
-    /// The sightings compared.
+    /// The detections compared.
     pub(super) fn grid(&self, fidelity: Fidelity) -> &Grid {
         match fidelity {
             Fidelity::Coarse => &self.coarse,
@@ -146,7 +146,7 @@ impl<'a> Film<'a> {
         }
     }
 
-    /// What the sightings of the clamp tell about the clocks.
+    /// What the detections of the clamp tell about the clocks.
     pub(super) fn clock_window(&self) -> ClockWindow {
         let first_of_frames = self.fine.cells.iter().step_by(self.fine.keypoints);
         let seen = first_of_frames.flatten().map(|s| (s.time_s, s.pixel));

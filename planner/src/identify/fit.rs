@@ -68,7 +68,7 @@ pub(super) fn fit(
         Start::Cmaes => (fit.cmaes(Reach::Ranges)?, "cmaes"),
     };
     let found = out_of_distribution(&near);
-    if !found.is_outside() || matches!(start, Start::Cmaes) {
+    if !found.is_flagged() || matches!(start, Start::Cmaes) {
         return Ok(fit.estimate(&near, found, label));
     }
     tracing::info!(
@@ -107,7 +107,7 @@ impl Fit<'_> {
         let coordinates = self.film.coordinates(self.clock, Reach::Ranges);
         let found = from_proposal(&self.film, &coordinates, rope, &mut self.budget)?;
         let near = self.refine(&coordinates, &found.x, found.at.distance_px)?;
-        if !out_of_distribution(&near).is_outside() {
+        if !out_of_distribution(&near).is_flagged() {
             return Ok((near, PROPOSED));
         }
         let searched = self.searched()?;

@@ -7,7 +7,7 @@ use super::coordinates::{
     Square, link_range, simulated_rope, sway_of,
 };
 use super::error::IdentifyError;
-use super::film::{Fidelity, Film, Grid, Instant, Sighting, is_finite, sample_s};
+use super::film::{Detection, Fidelity, Film, Grid, Instant, is_finite, sample_s};
 use super::noise::{Noise, RESIDUAL, Row, Rows};
 use crate::workers::map_in_order;
 use nalgebra::SMatrix;
@@ -205,7 +205,7 @@ fn compare(
     let rows: Vec<Option<Option<[Row; 2]>>> = map_in_order(cells, film.options.threads, |cell| {
         // The outer `None`: seen by the camera, but not by the simulated one.
         match cell {
-            Some(sighting) => comparison.rows(sighting).map(Some),
+            Some(detection) => comparison.rows(detection).map(Some),
             None => Some(None),
         }
     });
@@ -235,18 +235,18 @@ fn compare(
 
 impl Comparison<'_> {
     /// Simulated minus seen pixels and their slopes, along and across the rope.
-    fn rows(&self, sighting: &Sighting) -> Option<[Row; 2]> {
+    fn rows(&self, detection: &Detection) -> Option<[Row; 2]> {
         let samples = self.nodes.frames();
-        let time_s = sighting.time_s - self.clock_s;
+        let time_s = detection.time_s - self.clock_s;
         let now = Instant::new(time_s, self.period_s, samples);
-        let p = now.position(self.nodes, sighting.along);
+        let p = now.position(self.nodes, detection.along);
         let seen = self.view.project(&p)?;
         let mut out = [[0.0; FREE + 1]; 2];
         for pair in self.pairs {
-            let to = now.position(&pair.to.nodes, sighting.along);
+            let to = now.position(&pair.to.nodes, detection.along);
             let from = pair
                 .from
-                .map_or(p, |r| now.position(&r.nodes, sighting.along));
+                .map_or(p, |r| now.position(&r.nodes, detection.along));
             let moved = self.view.project(&(p + (to - from)))?;
             for axis in 0..2 {
                 out[axis][pair.coordinate] = (moved[axis] - seen[axis]) / pair.span;
@@ -254,12 +254,15 @@ impl Comparison<'_> {
         }
         let later = Instant::new(time_s + CLOCK_STEP_S, self.period_s, samples);
         let before = Instant::new(time_s - CLOCK_STEP_S, self.period_s, samples);
-        let at = |now: &Instant| self.view.project(&now.position(self.nodes, sighting.along));
+        let at = |now: &Instant| {
+            self.view
+                .project(&now.position(self.nodes, detection.along))
+        };
         let (b, a) = (at(&later)?, at(&before)?);
         for axis in 0..2 {
             // A camera clock that is ahead sees an earlier rope.
             out[axis][CLOCK] = (a[axis] - b[axis]) / (2.0 * CLOCK_STEP_S);
-            out[axis][RESIDUAL] = seen[axis] - sighting.pixel[axis];
+            out[axis][RESIDUAL] = seen[axis] - detection.pixel[axis];
         }
         for (i, view) in self.beside.iter().enumerate() {
             let moved = view.project(&p)?;
@@ -267,8 +270,8 @@ impl Comparison<'_> {
                 out[axis][CAMERA + i] = (moved[axis] - seen[axis]) / CAMERA_STEP;
             }
         }
-        let [c, s] = self.tangent(&now, sighting.along)?;
-        let weight = sighting.weight.sqrt();
+        let [c, s] = self.tangent(&now, detection.along)?;
+        let weight = detection.weight.sqrt();
         let mut turned = [[0.0; FREE + 1]; 2];
         for i in 0..=FREE {
             let (u, v) = (out[0][i], out[1][i]);
@@ -326,7 +329,7 @@ impl Linearised {
     }
 }
 
-/// Huber's weight of a whitened sighting.
+/// Huber's weight of a whitened detection.
 pub(super) fn influence(row: &[Row; 2]) -> f64 {
     let distance = row[0][RESIDUAL].hypot(row[1][RESIDUAL]);
     (HUBER / distance.max(1e-12)).min(1.0)

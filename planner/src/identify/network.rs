@@ -88,6 +88,7 @@ pub(super) fn estimate(
             links_probability: links_probability(mean[0], std_dev[0]),
             ambiguities: unseen.map(ambiguity).collect(),
             inflation: 1.0,
+            residual_m: distance_px * film.viewer.pixel_m(),
         },
         // It fits neither noise nor camera.
         circumstances: FitCircumstances::default(),
@@ -207,8 +208,8 @@ mod tests {
 
     #[test]
     fn an_unusual_film_or_a_rope_that_misses_it_is_outside() {
-        assert!(!out_of_distribution(0.8, 2.0).is_outside());
-        assert!(out_of_distribution(1.1, 2.0).is_outside());
+        assert!(!out_of_distribution(0.8, 2.0).is_flagged());
+        assert!(out_of_distribution(1.1, 2.0).is_flagged());
         assert!(out_of_distribution(0.8, 9.0).reasons[0].contains("9.0 px"));
     }
 }

@@ -59,7 +59,7 @@ pub(super) fn posterior(fit: &Refined, film: &Film<'_>) -> (RopeParams, RopePost
     for d in &mut draws {
         d.weight /= total;
     }
-    let posterior = summarise(&draws, fit);
+    let posterior = summarise(&draws, fit, film.viewer.pixel_m());
     let params = likeliest(
         &draws,
         &posterior,
@@ -182,7 +182,7 @@ fn quantiles<const N: usize>(
     })
 }
 
-fn summarise(draws: &[Draw], fit: &Refined) -> RopePosterior {
+fn summarise(draws: &[Draw], fit: &Refined, pixel_m: f64) -> RopePosterior {
     let mut mean = [0.0; ROPE_PARAMETERS];
     for d in draws {
         for (m, v) in mean.iter_mut().zip(d.values) {
@@ -207,6 +207,7 @@ fn summarise(draws: &[Draw], fit: &Refined) -> RopePosterior {
         links_probability,
         ambiguities: ambiguities(&covariance),
         inflation: fit.inflation,
+        residual_m: fit.at.distance_px * pixel_m,
     }
 }
 

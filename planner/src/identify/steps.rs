@@ -62,11 +62,11 @@ fn moved_px(film: &Film<'_>, x: &Point) -> Result<f64, IdentifyError> {
 fn apart_px(film: &Film<'_>, x: &Point, a: &NodeTrack, b: &NodeTrack) -> f64 {
     let view = film.viewer.view(&corrections(x));
     let cells = film.grid(Fidelity::Fine).cells.iter().flatten();
-    let distances2 = cells.filter_map(|sighting| {
-        let time_s = sighting.time_s - x[CLOCK];
+    let distances2 = cells.filter_map(|detection| {
+        let time_s = detection.time_s - x[CLOCK];
         let now = Instant::new(time_s, sample_s(Fidelity::Fine), a.frames());
-        let [ua, va] = view.project(&now.position(a, sighting.along))?;
-        let [ub, vb] = view.project(&now.position(b, sighting.along))?;
+        let [ua, va] = view.project(&now.position(a, detection.along))?;
+        let [ub, vb] = view.project(&now.position(b, detection.along))?;
         Some((ua - ub).powi(2) + (va - vb).powi(2))
     });
     let (sum, count) = distances2.fold((0.0, 0.0), |(sum, n), d2| (sum + d2, n + 1.0));

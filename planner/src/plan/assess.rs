@@ -8,6 +8,9 @@ use shared_types::{Plan, Task};
 const MISS_WARN_M: f64 = 0.01;
 const MISS_MAX_M: f64 = 0.05;
 
+/// Upper end of a forecast above which the throw is pointed out as uncertain (m).
+const FORECAST_WARN_M: f64 = 0.015;
+
 /// What is wrong with a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Shortcoming {
@@ -58,6 +61,16 @@ pub fn warnings(plan: &Plan) -> Vec<String> {
             f.failed, f.ropes
         )
     });
+    let wide = plan
+        .forecast
+        .filter(|f| f.interval_90_m[1] > FORECAST_WARN_M);
+    let wide = wide.map(|f| {
+        format!(
+            "the tip may miss by up to {:.1} cm (95 %): the film leaves open, or the model does not explain, how this rope moves; weigh the tip (--lead-mass), measure the length (--length), film a gentler wiggle, or correct the first throw by its miss (`wag plan again`)",
+            100.0 * f.interval_90_m[1]
+        )
+    });
+    let failed = failed.into_iter().chain(wide);
     let first = poor.into_iter().chain(interrupted).chain(failed);
     first.chain(far_outside(&plan.rope)).collect()
 }

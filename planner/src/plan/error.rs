@@ -16,13 +16,13 @@ pub enum PlanError {
     Target(String),
     /// No throw of this rope can bring its tip to the target.
     #[error(
-        "target ({:.2}, {:.2}, {:.2}) m is out of reach: {reason}; a point in reach near it is ({:.2}, {:.2}, {:.2}) m",
+        "target ({:.2}, {:.2}, {:.2}) m is out of reach: {reason}; these bounds allow ({:.2}, {:.2}, {:.2}) m, and `--reach FILE.svg` draws what throws reach",
         target_m[0], target_m[1], target_m[2], nearest_m[0], nearest_m[1], nearest_m[2]
     )]
     Unreachable {
         /// The target as given (m).
         target_m: [f64; 3],
-        /// A point near it that can be reached (m).
+        /// A point near it within these bounds (m).
         nearest_m: [f64; 3],
         /// Which bound it breaks.
         reason: String,
@@ -63,6 +63,9 @@ pub enum PlanError {
         "every throw found within {0} simulations lets the arm or its pole collide: move the target away from the arm or search longer"
     )]
     OnlyCollisions(u32),
+    /// The last throw cannot be corrected.
+    #[error("{0}")]
+    Again(String),
     /// The finished trajectory breaks a limit after all; nothing is sent.
     #[error("the planned trajectory breaks a limit: {0}")]
     BreaksLimit(String),
@@ -75,6 +78,7 @@ impl PlanError {
         matches!(
             self,
             Self::Target(_)
+                | Self::Again(_)
                 | Self::Unreachable { .. }
                 | Self::Rope(_)
                 | Self::Payload { .. }

@@ -1,6 +1,7 @@
 //! Throws: the tasks, one file each behind one trait, and what they share: the search,
 //! errors, start pose and reach.
 
+mod again;
 mod assess;
 mod config;
 mod drape;
@@ -28,6 +29,7 @@ mod tests;
 mod throw;
 mod waypoints;
 
+pub use again::plan_again;
 pub use assess::{Shortcoming, shortcoming, warnings};
 pub use config::{PlanOptions, Robustness, ThrowConfig, ThrowWeights};
 pub use drape::{Drape, DrapeConfig};

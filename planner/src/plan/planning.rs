@@ -32,14 +32,7 @@ pub fn plan_task(
     request: &PlanRequest,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Plan, PlanError> {
-    let target_m = task.target_m();
-    request.rope.validate()?;
-    check_payload(&request.rope)?;
-    request.options.check()?;
-    task.config().check()?;
-    request.goal.check()?;
-    check_reach(target_m, request.rope.length_m, &request.cell)?;
-    clear_of_arm(target_m, &request.cell)?;
+    check(task, request)?;
     let setup = Setup::new(task, request)?;
     let mut count = Count::default();
     let mut finalists: Vec<Finalist> = Vec::new();
@@ -64,10 +57,21 @@ pub fn plan_task(
     setup.finish(chosen, count)
 }
 
+/// Refuses what cannot be planned, before any simulation.
+pub(super) fn check(task: &dyn ThrowTask, request: &PlanRequest) -> Result<(), PlanError> {
+    request.rope.validate()?;
+    check_payload(&request.rope)?;
+    request.options.check()?;
+    task.config().check()?;
+    request.goal.check()?;
+    check_reach(task.target_m(), request.rope.length_m, &request.cell)?;
+    clear_of_arm(task.target_m(), &request.cell)
+}
+
 impl Setup<'_> {
     /// The plan as it is written down. The prediction comes from double precision at half
     /// the step.
-    fn finish(&self, chosen: Finalist, mut count: Count) -> Result<Plan, PlanError> {
+    pub(super) fn finish(&self, chosen: Finalist, mut count: Count) -> Result<Plan, PlanError> {
         let (request, trajectory) = (self.request, chosen.trajectory);
         if let Some(margin) = request.limits.worst_violation(&trajectory) {
             return Err(PlanError::BreaksLimit(margin.describe()));
@@ -85,6 +89,7 @@ impl Setup<'_> {
             seed: request.options.seed,
             task: request.goal.kind(),
             target_m: self.task.target_m(),
+            aim_m: None,
             rope: *rope,
             cell: Some(request.cell),
             predicted_error_m: self.task.error_m(&outcome),
@@ -94,7 +99,7 @@ impl Setup<'_> {
             limited_by: Some(self.limited_by(&trajectory, &outcome, &verdict)),
             verdict,
             forecast,
-            doubts: Vec::new(),
+            unconfirmed: Vec::new(),
             arm_response: request.following.as_ref().map(|f| f.source().to_owned()),
             simulations: count.simulations,
             resampled: count.resampled,

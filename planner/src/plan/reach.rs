@@ -101,7 +101,7 @@ pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Resul
     })
 }
 
-/// A point in reach, on the target's bearing.
+/// A point within the bounds, on the target's bearing.
 fn nearest(
     rho: f64,
     [x, y, z]: [f64; 3],

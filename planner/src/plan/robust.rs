@@ -5,6 +5,10 @@ use super::search::{Search, Valued};
 use super::setup::{Count, Setup};
 use super::{PlanError, ThrowOutcome};
 use arm_model::JointTrajectory;
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+use rand_distr::StandardNormal;
 use shared_types::ErrorForecast;
 use shared_types::ipc::message::Progress;
 use std::ops::ControlFlow;
@@ -106,11 +110,28 @@ impl Setup<'_> {
         } else {
             self.judging.run(&throws)?
         };
+        let mut rng = ChaCha12Rng::seed_from_u64(self.request.options.seed ^ 0xd15c);
+        let mut normal = |_, _| ensemble.discrepancy_m * rng.sample::<f64, _>(StandardNormal);
         let finite = outcomes.iter().filter(|o| o.finite);
-        let errors = finite.map(|o| self.task.error_m(o));
+        let errors = finite.map(|o| self.error_beside_m(o, Vector3::from_fn(&mut normal)));
         let errors: Vec<f64> = errors.filter(|e| e.is_finite()).collect();
         let failed = throws.len() - errors.len() + ensemble.undrawn as usize;
         Ok(error_forecast(errors, failed, self.request.rope.length_m))
+    }
+}
+
+impl Setup<'_> {
+    /// Error of a throw whose tip passes `beside` its simulated path (m). What is beside along
+    /// the path makes the tip early or late and nothing else.
+    fn error_beside_m(&self, outcome: &ThrowOutcome, beside: Vector3<f64>) -> f64 {
+        let closest = outcome.watched.to_point;
+        let Some(closest) = closest.filter(|_| self.task.polishes()) else {
+            return self.task.error_m(outcome).hypot(beside.norm());
+        };
+        let velocity = Vector3::from(closest.velocity_m_s);
+        let along = velocity * (beside.dot(&velocity) / velocity.norm_squared().max(1e-12));
+        let miss = Vector3::from(closest.tip_m) - Vector3::from(outcome.point_m);
+        (miss + beside - along).norm()
     }
 }
 

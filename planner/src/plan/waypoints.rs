@@ -150,6 +150,32 @@ impl WaypointSpace {
         out
     }
 
+    /// The point of a trajectory that leaves the start pose, or it turned within the bounds;
+    /// none for one of other waypoints.
+    pub(super) fn encode(&self, trajectory: &JointTrajectory) -> Option<Vec<f64>> {
+        let (knots, times_s) = (trajectory.waypoints(), trajectory.times_s());
+        let fixed_s = self.knot_times_s(&[]);
+        if knots.len() != fixed_s.len() {
+            return None;
+        }
+        let joints = self.dimensions.joints();
+        let moved = knots[1..].iter().flat_map(|q| joints.iter().map(|&j| q[j]));
+        let mut x: Vec<f64> = moved.collect();
+        x.resize(self.pose_count(), knots[0][0] - self.start[0]);
+        if self.is_timed() {
+            let spans = times_s.windows(2).zip(fixed_s.windows(2));
+            x.extend(spans.map(|(is, fixed)| libm::log((is[1] - is[0]) / (fixed[1] - fixed[0]))));
+        }
+        let near = |a: &f64, b: &f64| (a - b).abs() < 1e-9;
+        let same_times = times_s
+            .iter()
+            .zip(&self.knot_times_s(&x))
+            .all(|(a, b)| near(a, b));
+        let same =
+            |(a, b): (&JointVector, &JointVector)| a.iter().zip(b.iter()).all(|(a, b)| near(a, b));
+        (same_times && knots.iter().zip(&self.knots(&x)).all(same)).then_some(x)
+    }
+
     /// The trajectory of a point.
     ///
     /// # Errors
@@ -206,6 +232,15 @@ mod tests {
             }
             let last = *space.dimensions.joints().last().unwrap();
             assert!((moved.end()[last] - START_POSE[last] - 0.25).abs() < 1e-12);
+            let again = space.encode(&moved).unwrap();
+            assert!(again.iter().zip(&x).all(|(a, b)| (a - b).abs() < 1e-12));
+            // Times that are fixed elsewhere, and a joint that the space does not move.
+            assert_eq!(spaces(1.0)[0].encode(&moved), None);
+            let mut knots = moved.waypoints().to_vec();
+            knots[2][6] += 0.1;
+            let seventh = JointTrajectory::new(moved.times_s(), &knots).unwrap();
+            let is_planar = space.dimensions == Dimensions::Planar;
+            assert_eq!(space.encode(&seventh).is_none(), is_planar);
             let (low, high) = space.bounds(&Limits::default());
             assert_eq!((low.len(), high.len()), (x.len(), x.len()));
             assert!((high[x.len() - 1] - 1.5_f64.ln()).abs() < 1e-15);

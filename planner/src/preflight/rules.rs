@@ -2,7 +2,7 @@
 
 use arm_model::capsules::self_clearance_m;
 use arm_model::limits::STEP_MAX_M;
-use arm_model::{JOINTS, JointVector, Limits, kinematics};
+use arm_model::{JOINTS, JointVector, Limits};
 use control_core::control::Thresholds;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -174,7 +174,8 @@ impl Rule {
             q,
             deviation_rad,
         } = step;
-        let way_m = || (tool(setpoint, limits) - tool(before, limits)).norm();
+        let way_m =
+            || (limits.tool_centre_point_m(setpoint) - limits.tool_centre_point_m(before)).norm();
         match self {
             Self::JointRange => (0..JOINTS)
                 .map(|j| {
@@ -192,17 +193,12 @@ impl Rule {
             Self::ToolSpeed => way_m() / limits.period_s(),
             Self::StepLength => way_m(),
             Self::SelfCollision => self_clearance_m(q),
-            Self::SafetyBoundary => arm
-                .fence
-                .map_or(f64::INFINITY, |f| f.inside_m(&tool(q, limits))),
+            Self::SafetyBoundary => arm.fence.map_or(f64::INFINITY, |f| {
+                f.inside_m(&limits.tool_centre_point_m(q))
+            }),
             Self::Tracking => *deviation_rad,
         }
     }
-}
-
-fn tool(q: &JointVector, limits: &Limits) -> Vector3<f64> {
-    let (p, r) = kinematics::flange_pose(q);
-    p + r * limits.tcp_offset()
 }
 
 /// How close the setpoints come to one rule.

@@ -14,7 +14,7 @@ mod record;
 
 pub use camera::side_camera;
 pub use noise::{FilmNoise, Randomisation};
-pub use project::{FilmTiming, Filmed, project};
+pub use project::{FilmTiming, SyntheticFilm, project};
 pub use record::{KeypointLayout, RecordOptions, RopeFilm, record};
 
 use rope_sim::{AttachMotion, SimulateError};
@@ -29,7 +29,7 @@ pub fn film(
     keypoints: impl Into<KeypointLayout>,
     timing: &FilmTiming,
     noise: &FilmNoise,
-) -> Result<Filmed, SimulateError> {
+) -> Result<SyntheticFilm, SimulateError> {
     let options = RecordOptions {
         layout: keypoints.into(),
         duration_s: timing.duration_s() + noise.clock_offset_s.abs() + 0.05,

@@ -59,7 +59,8 @@ pub struct Randomisation {
     pub tracking_px: [f64; 2],
     /// Deviation across the rope as a part of that along it: trackers slip along
     /// a rope more easily than off it.
-    pub lateral_part: f64,
+    #[serde(alias = "lateral_part")]
+    pub lateral_fraction: f64,
     /// Correlation of a keypoint's error with that of the frame before.
     pub correlation: f64,
     /// Fewest and most frames before the motion begins.
@@ -76,7 +77,7 @@ impl Default for Randomisation {
             camera_position_m: 0.02,
             camera_lookat_m: 0.02,
             tracking_px: [0.0, 3.0],
-            lateral_part: 0.5,
+            lateral_fraction: 0.5,
             correlation: 0.8,
             padding_frames: [0, 20],
             clock_offset_s: 0.02,
@@ -97,7 +98,7 @@ impl Randomisation {
             ("camera_lookat_m", self.camera_lookat_m, 0.5, SMALL),
             ("tracking_px", px_max, 50.0, "two numbers from 0 to 50"),
             ("tracking_px", px_min, px_max, "the smaller number first"),
-            ("lateral_part", self.lateral_part, 10.0, "0 to 10"),
+            ("lateral_fraction", self.lateral_fraction, 10.0, "0 to 10"),
             ("correlation", self.correlation, 0.999, "0 to 0.999"),
             ("padding_frames", pad_max, 200.0, "two counts up to 200"),
             ("padding_frames", pad_min, pad_max, COUNT_ORDER),
@@ -122,7 +123,7 @@ impl Randomisation {
             camera_shift_m: gaussian3(rng, self.camera_position_m),
             lookat_shift_m: gaussian3(rng, self.camera_lookat_m),
             longitudinal_px,
-            lateral_px: longitudinal_px * self.lateral_part,
+            lateral_px: longitudinal_px * self.lateral_fraction,
             correlation: self.correlation,
             padding_frames: rng.random_range(pad_min..=pad_max.max(pad_min)),
             clock_offset_s: uniform(rng, [-self.clock_offset_s, self.clock_offset_s]),

@@ -37,7 +37,7 @@ impl FilmTiming {
 
 /// What the tracker gives of a film.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Filmed {
+pub struct SyntheticFilm {
     /// Keypoints in raw pixels of the camera's left eye. Points behind the camera
     /// have confidence 0.
     pub track: KeypointTrack,
@@ -54,7 +54,7 @@ pub fn project(
     camera: &StereoCamera,
     timing: &FilmTiming,
     noise: &FilmNoise,
-) -> Filmed {
+) -> SyntheticFilm {
     let keypoints = film.keypoints;
     let middle = film.position(0.0, keypoints / 2);
     let depth_m = camera.to_left(&middle).z.max(0.1);
@@ -85,11 +85,11 @@ pub fn project(
         });
         errors.advance();
     }
-    Filmed {
+    SyntheticFilm {
         track: KeypointTrack {
             keypoints,
             frames,
-            doubts: Vec::new(),
+            unconfirmed: Vec::new(),
         },
         appearance: appearance(film, camera, &real, depth_m, noise),
     }

@@ -12,7 +12,7 @@ fn arm() -> PlannedArm {
 }
 
 /// Two seconds of a wiggled rope.
-fn look(rope: u64, camera: &StereoCamera, keypoints: usize, noise: &FilmNoise) -> Filmed {
+fn look(rope: u64, camera: &StereoCamera, keypoints: usize, noise: &FilmNoise) -> SyntheticFilm {
     let timing = FilmTiming {
         frames: 120,
         rate_hz: 60.0,
@@ -29,7 +29,7 @@ fn look(rope: u64, camera: &StereoCamera, keypoints: usize, noise: &FilmNoise) -
 }
 
 /// Largest distance between the keypoints of two films (px).
-fn apart_px(a: &Filmed, b: &Filmed) -> f64 {
+fn apart_px(a: &SyntheticFilm, b: &SyntheticFilm) -> f64 {
     let frames = a.track.frames.iter().zip(&b.track.frames);
     frames
         .flat_map(|(a, b)| a.points.iter().zip(&b.points))
@@ -189,13 +189,13 @@ fn a_misplaced_camera_moves_the_picture_but_keeps_what_it_looks_at() {
     };
     let [plain, nearer, turned] =
         [FilmNoise::default(), nearer, turned].map(|noise| look(7, &side_camera(), 5, &noise));
-    let length = |f: &Filmed| {
+    let length = |f: &SyntheticFilm| {
         let points = &f.track.frames[0].points;
         (points[4][0] - points[0][0]).hypot(points[4][1] - points[0][1])
     };
     let ratio = length(&nearer) / length(&plain);
     assert!((ratio - 1.0 / 0.98).abs() < 3e-3, "{ratio}");
-    let wide = |f: &Filmed| f.appearance.lead_radius_m.unwrap();
+    let wide = |f: &SyntheticFilm| f.appearance.lead_radius_m.unwrap();
     assert!((wide(&nearer) / wide(&plain) - 1.0 / 0.98).abs() < 1e-3);
     assert!((wide(&plain) / random_rope(7).lead_radius_m - 1.0).abs() < 1e-6);
     let moved = plain.track.frames[0].points[2][0] - turned.track.frames[0].points[2][0];

@@ -178,7 +178,7 @@ impl<'a> Studio<'a> {
                 phase.apply(&mut features, &mut rng);
             }
             for width in features.widths.chunks_mut(2) {
-                if rng.random::<f64>() < training.width_missing_part {
+                if rng.random::<f64>() < training.width_missing_fraction {
                     width.fill(0.0);
                 }
             }

@@ -80,7 +80,8 @@ pub(crate) struct OptimisationConfig {
     /// Held-out ropes looked at.
     pub(crate) validation_ropes: usize,
     /// Part of the films in which a width is not seen.
-    pub(crate) width_missing_part: f64,
+    #[serde(alias = "width_missing_part")]
+    pub(crate) width_missing_fraction: f64,
     /// What is masked when, in the order of time.
     #[serde(default)]
     pub(crate) masking: Vec<MaskPhase>,
@@ -145,9 +146,9 @@ impl TrainingConfig {
                 "1 to data.held_out",
             ),
             (
-                "training.width_missing_part",
-                training.width_missing_part,
-                (0.0..=1.0).contains(&training.width_missing_part),
+                "training.width_missing_fraction",
+                training.width_missing_fraction,
+                (0.0..=1.0).contains(&training.width_missing_fraction),
                 "0 to 1",
             ),
         ];

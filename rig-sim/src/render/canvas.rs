@@ -2,11 +2,11 @@
 
 use super::bodies::Spell;
 use super::colour::{Ycc, lit};
+use super::environment::View;
 use super::image_view::ImageView;
 use super::lamp_view::Cover;
 use super::layer::{RowLayer, composite};
 use super::sensor::pack_yuyv;
-use super::surroundings::View;
 use crate::room::lamp::level;
 
 /// What one eye keeps between frames.

@@ -20,6 +20,7 @@ mod backdrop;
 mod bodies;
 mod canvas;
 pub(crate) mod colour;
+mod environment;
 mod image_view;
 mod lamp_view;
 mod layer;
@@ -33,7 +34,6 @@ mod shadows;
 mod shutter;
 pub(crate) mod solid;
 mod stroke;
-mod surroundings;
 pub(crate) mod texture;
 pub(crate) mod weave;
 

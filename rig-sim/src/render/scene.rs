@@ -3,12 +3,12 @@
 use super::appearance::Appearance;
 use super::bodies::{Cast, RopeLook, RopeShape, ScenePose, target_solids};
 use super::canvas::ImageCanvas;
+use super::environment::View;
 use super::image_view::ImageView;
 use super::lamp_view::LampView;
 use super::sensor::{Sensor, brighten};
 use super::shadows::Shadows;
 use super::shutter::RowTimes;
-use super::surroundings::View;
 use crate::room::bystander::Bystanders;
 use crate::room::{Picture, Room};
 use arm_model::Cell;

@@ -9,6 +9,7 @@ use super::load::Load;
 use super::{CycleTimes, LoopbackBench, LoopbackError};
 use crate::os::RealTimeSettings;
 use crate::os::schedule::run_on;
+use shared_types::ipc::message::Percentiles;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::time::Duration;
@@ -67,7 +68,8 @@ impl SideBySide {
         for turn in 0..seconds {
             say(turn);
             measured.ours.extend(bench.slice(Self::SLICE)?);
-            let work_ns = median(measured.ours.iter().map(|t| t.compute_ns));
+            let work = Percentiles::of_ns(measured.ours.iter().map(|t| t.compute_ns));
+            let work_ns = (work.p50_us * 1e3) as u64;
             let bare = bare_slice(&real_time, work_ns, Self::PERIOD, Self::SLICE)?;
             measured.bare.extend(bare);
             if let Ok(late_ns) = &mut measured.cyclictest {
@@ -79,12 +81,6 @@ impl SideBySide {
         }
         Ok(measured)
     }
-}
-
-fn median(samples: impl Iterator<Item = u64>) -> u64 {
-    let mut sorted: Vec<u64> = samples.collect();
-    sorted.sort_unstable();
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0)
 }
 
 /// Asks the kernel to keep cores out of deep sleep while the file is open, as

@@ -10,7 +10,7 @@ mod text;
 pub(crate) use atomic::cannot_write;
 pub use atomic::{check_writable, write_atomic, write_json};
 pub use motion::{JointsCsv, read_joints, read_pose, write_joints, write_trajectory};
-pub use rope::{read_doubts, read_posterior, read_rope, write_rope_estimate};
+pub use rope::{read_posterior, read_rope, read_unconfirmed, write_rope_estimate};
 pub(crate) use text::cannot_read;
 pub use text::{
     located, read_arm_response, read_cell, read_excitation, read_json, read_plan, read_text,
@@ -29,6 +29,8 @@ pub const COMMAND: &str = "command.json";
 pub const SUMMARY: &str = "summary.json";
 /// File of a run folder with the cell it ran in.
 pub const CELL: &str = "config/cell.toml";
+/// File of a run folder with the camera's calibration and place.
+pub const CAMERA: &str = "camera.toml";
 /// File of a run folder with the tracked keypoints.
 pub const KEYPOINTS: &str = "keypoints.json";
 /// File of a run folder with the identified rope.

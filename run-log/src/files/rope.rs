@@ -46,20 +46,26 @@ pub fn read_posterior(path: &Path) -> Result<Option<RopePosterior>> {
 
 /// Reads why the track that the rope was identified from should not be relied on; empty
 /// where it may be, and for a rope that was not identified.
-pub fn read_doubts(path: &Path) -> Result<Vec<String>> {
+pub fn read_unconfirmed(path: &Path) -> Result<Vec<String>> {
     let table: toml::Table = read_toml(path, "rope file")?;
-    let doubts = table.get("fit").and_then(|fit| fit.get("doubts")).cloned();
-    doubts
+    // Files of before call it `doubts`.
+    let unconfirmed = |fit: &toml::Value| fit.get("unconfirmed").or(fit.get("doubts")).cloned();
+    let found = table.get("fit").and_then(unconfirmed);
+    found
         .map_or(Ok(Vec::new()), toml::Value::try_into)
         .with_context(|| {
             let path = path.display();
-            format!("rope file `{path}`, `doubts` in its table `fit`")
+            format!("rope file `{path}`, `unconfirmed` in its table `fit`")
         })
 }
 
 /// Writes an identified rope, and why the track that it was identified from should not be
 /// relied on.
-pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate, doubts: &[String]) -> Result<()> {
+pub fn write_rope_estimate(
+    path: &Path,
+    estimate: &RopeEstimate,
+    unconfirmed: &[String],
+) -> Result<()> {
     let mut text = format!(
         "# Rope parameters identified by wag {}; SI units, radians.\n",
         shared_types::VERSION
@@ -83,11 +89,15 @@ pub fn write_rope_estimate(path: &Path, estimate: &RopeEstimate, doubts: &[Strin
         estimate.simulations,
         estimate.seed,
         estimate.time_offset_s,
-        estimate.out_of_distribution.is_outside(),
+        estimate.out_of_distribution.is_flagged(),
         estimate.out_of_distribution.score
     )?;
-    if !doubts.is_empty() {
-        writeln!(text, "doubts = {}", toml::Value::try_from(doubts)?)?;
+    if !unconfirmed.is_empty() {
+        writeln!(
+            text,
+            "unconfirmed = {}",
+            toml::Value::try_from(unconfirmed)?
+        )?;
     }
     text.push_str(
         "\n# Mean and covariance in the order of the keys above; probability of 20 to 26 links.\n",
@@ -135,6 +145,7 @@ mod tests {
                     kept: 0.9,
                 }],
                 inflation: 1.0,
+                residual_m: 0.0,
             },
             circumstances: FitCircumstances::default(),
             out_of_distribution: OutOfDistribution {
@@ -149,11 +160,11 @@ mod tests {
     fn an_identified_rope_can_be_read_as_a_rope() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("rope.toml");
-        let doubts = ["the rope's \"end\" is not confirmed".to_owned()];
-        write_rope_estimate(&path, &estimate(), &doubts).unwrap();
-        assert_eq!(read_doubts(&path).unwrap(), doubts);
+        let unconfirmed = ["the rope's \"end\" is not confirmed".to_owned()];
+        write_rope_estimate(&path, &estimate(), &unconfirmed).unwrap();
+        assert_eq!(read_unconfirmed(&path).unwrap(), unconfirmed);
         write_rope_estimate(&path, &estimate(), &[]).unwrap();
-        assert!(read_doubts(&path).unwrap().is_empty());
+        assert!(read_unconfirmed(&path).unwrap().is_empty());
         assert_eq!(read_rope(&path).unwrap(), estimate().params);
         let posterior = read_posterior(&path).unwrap();
         assert_eq!(posterior, Some(estimate().posterior));

@@ -48,7 +48,10 @@ pub fn read_cell(path: &Path) -> Result<Cell> {
 
 /// Reads a plan and verifies that it was not changed after it was planned.
 pub fn read_plan(path: &Path) -> Result<Plan> {
-    let plan: Plan = read_json(path)?;
+    let plan: Plan = serde_json::from_str(&read_text(path)?).with_context(|| {
+        let name = path.display();
+        format!("`{name}` is no plan (JSON, as `wag plan` writes it)")
+    })?;
     ensure!(
         trajectory_hash_hex(&plan.trajectory) == plan.trajectory_sha256,
         "`{}`: `trajectory_sha256` does not match the waypoints; the file was changed by hand or \

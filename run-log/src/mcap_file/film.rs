@@ -2,6 +2,7 @@
 //! on the pictures' clock.
 
 use super::channel::Channel;
+use super::messages::mode_name;
 use super::read::{Walked, walk};
 use super::urdf::joint_name;
 use crate::files::JointsCsv;
@@ -188,8 +189,7 @@ impl RunFilm {
             self.joints.extend(reported.vector().map(|q| (at_ns, q)));
         } else if topic == Channel::Cycles.topic() {
             let cycle: CycleMessage = serde_json::from_slice(data)?;
-            let streaming = format!("{:?}", ControllerMode::Streaming);
-            self.cycle(at_ns, cycle.mode == streaming);
+            self.cycle(at_ns, cycle.mode == mode_name(ControllerMode::Streaming));
         }
         Ok(())
     }

@@ -62,13 +62,18 @@ pub(super) fn commanded(at_ns: u64, cycle: &CycleRecord) -> Value {
     joints(at_ns, &cycle.q_c, None)
 }
 
+/// A controller mode as a cycle's message names it.
+pub(super) fn mode_name(mode: ControllerMode) -> String {
+    format!("{mode:?}")
+}
+
 /// Figures of a cycle.
 pub(super) fn cycle(at_ns: u64, c: &CycleRecord) -> Value {
     let us = |ns: u32| f64::from(ns) / 1e3;
     let mut message = json!({
         "timestamp": time(at_ns),
         "cycle": c.cycle,
-        "mode": format!("{:?}", ControllerMode::from_raw(c.mode)),
+        "mode": mode_name(ControllerMode::from_raw(c.mode)),
         "fault": format!("{:?}", FaultCode::from_raw(c.fault).unwrap_or_default()),
         "sent": c.sent != 0,
         "wake_late_us": us(c.wake_late_ns),

@@ -31,6 +31,8 @@ pub struct ScoreResult {
     pub closest_m: f64,
     /// Interval that should hold the true value (m).
     pub interval_m: [f64; 2],
+    /// Tip minus target at that instant, in the world (m).
+    pub miss_m: [f64; 3],
     /// When it happened, relative to the first frame scored (s).
     pub time_s: f64,
     /// Target position in the world (m).
@@ -133,7 +135,7 @@ pub enum CameraEvent {
         /// Processing time per frame (ms).
         ms_per_frame: f64,
         /// Why the track should not be relied on; none where it may be.
-        doubts: Vec<String>,
+        unconfirmed: Vec<String>,
     },
     /// The throw is measured.
     Scored(ScoreResult),
@@ -235,6 +237,25 @@ pub struct Percentiles {
     pub p999_us: f64,
     /// Largest.
     pub max_us: f64,
+}
+
+impl Percentiles {
+    /// Of samples in nanoseconds, by nearest rank; zero without any. Allocates.
+    pub fn of_ns(samples_ns: impl IntoIterator<Item = u64>) -> Self {
+        let mut sorted: Vec<u64> = samples_ns.into_iter().collect();
+        sorted.sort_unstable();
+        let at_us = |per_mille: usize| {
+            let rank = (sorted.len() * per_mille).div_ceil(1000).max(1);
+            sorted.get(rank - 1).map_or(0.0, |ns| *ns as f64 * 1e-3)
+        };
+        Self {
+            count: sorted.len() as u64,
+            p50_us: at_us(500),
+            p99_us: at_us(990),
+            p999_us: at_us(999),
+            max_us: at_us(1000),
+        }
+    }
 }
 
 /// Latencies of the control loop.
@@ -397,5 +418,19 @@ impl Rpc for RigRpc {
     type Event = RigEvent;
     fn is_last(_event: &RigEvent) -> bool {
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Percentiles;
+
+    #[test]
+    fn percentiles_are_samples_by_nearest_rank() {
+        let p = Percentiles::of_ns((1..=1000).map(|k| k * 1000));
+        let found = [p.p50_us, p.p99_us, p.p999_us, p.max_us];
+        let mut pairs = found.iter().zip([500.0, 990.0, 999.0, 1000.0]);
+        assert!(pairs.all(|(g, w)| (g - w).abs() < 1e-9), "{p:?}");
+        assert_eq!(Percentiles::of_ns([]).count, 0);
     }
 }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 /// Files that are looked at, in the order of [`Facts::stamps`].
-const FILES: [&str; 4] = ["params.toml", "plan.json", "camera.toml", files::CELL];
+const FILES: [&str; 4] = [files::ROPE, files::PLAN, files::CAMERA, files::CELL];
 
 /// The domain that a run's controller was configured with.
 pub fn domain_of_run(run: &Path) -> anyhow::Result<String> {
@@ -49,7 +49,7 @@ impl Facts {
     /// The file of the camera's calibration, where it lies in the folder.
     pub(crate) fn camera_file(&self) -> Option<PathBuf> {
         self.camera.as_ref()?;
-        Some(self.folder.as_ref()?.join("camera.toml"))
+        Some(self.folder.as_ref()?.join(files::CAMERA))
     }
 
     /// Reads what has changed. Files are written whole or not at all; one that is there
@@ -64,8 +64,8 @@ impl Facts {
             }
             *stamp = now;
             match *file {
-                "params.toml" => self.identified = files::read_rope(&path).ok(),
-                "plan.json" => self.plan = files::read_json(&path).ok(),
+                files::ROPE => self.identified = files::read_rope(&path).ok(),
+                files::PLAN => self.plan = files::read_json(&path).ok(),
                 files::CELL => self.cell = files::read_cell(&path).ok(),
                 _ => self.camera = load_camera(&path).ok(),
             }
@@ -111,8 +111,8 @@ mod tests {
         assert!(facts.rope().is_none() && facts.target_m().is_none());
         let rope = RopeParams::from_array(RANGES.map(|r| r.min));
         let text = toml::to_string(&rope).unwrap();
-        std::fs::write(dir.path().join("params.toml"), text).unwrap();
-        std::fs::write(dir.path().join("plan.json"), "{").unwrap();
+        std::fs::write(dir.path().join(files::ROPE), text).unwrap();
+        std::fs::write(dir.path().join(files::PLAN), "{").unwrap();
         facts.look();
         assert_eq!(facts.rope().unwrap().0, rope);
         assert!(facts.target_m().is_none());

@@ -56,6 +56,29 @@ pub struct PlanArgs {
 }
 
 #[derive(Debug, Args)]
+pub struct AgainArgs {
+    /// Run folder of a demo, which holds plan and miss; or the plan that was thrown (JSON).
+    pub last: PathBuf,
+    /// Where the tip passed, minus the target, as `wag score` prints it: x,y,z in the arm's
+    /// base frame (m). Default: as the run's camera measured it.
+    #[arg(long, allow_hyphen_values = true)]
+    pub miss: Option<Point>,
+    /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// Tuned values of the planner (TOML), laid over the effective ones (`wag config show
+    /// planner`).
+    #[arg(long)]
+    pub config: Option<PathBuf>,
+    /// The arm's response that the plan was made with (TOML).
+    #[arg(long, value_name = "FILE")]
+    pub arm_response: Option<PathBuf>,
+    /// The corrected plan (JSON).
+    #[arg(long)]
+    pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
 pub struct CheckArgs {
     /// The plan.
     pub plan: PathBuf,

@@ -4,7 +4,6 @@
 //! time with the recorder beside it (without, with, with, without, ...), while the
 //! simulated camera publishes. Both see the same machine and the same load.
 
-use super::bench_rt::percentiles;
 use crate::cli::BenchArgs;
 use crate::config;
 use crate::pipeline::{self, BringUp, RunFolder};
@@ -18,6 +17,7 @@ use rig_sim::RigConfig;
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::OperatingMode;
+use shared_types::ipc::message::Percentiles;
 use shared_types::ipc::{ControllerMode, CycleRecord};
 
 /// Part of the arm's speed limits used between two wiggles.
@@ -144,7 +144,7 @@ fn rows(cycles: &[Vec<CycleRecord>; 2]) -> Vec<(&'static str, &'static str, [f64
     let parts = |(what, time_ns): Figure| {
         let [without, with] = cycles
             .each_ref()
-            .map(|cycles| percentiles(cycles.iter().map(|c| u64::from(time_ns(c)))));
+            .map(|cycles| Percentiles::of_ns(cycles.iter().map(|c| u64::from(time_ns(c)))));
         [
             ("p50", without.p50_us, with.p50_us),
             ("p99", without.p99_us, with.p99_us),

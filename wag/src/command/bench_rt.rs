@@ -42,13 +42,13 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     for warning in &measured.warnings {
         println!("warning: {warning}");
     }
-    let ours = |of: fn(&CycleTimes) -> u64| percentiles(measured.ours.iter().map(of));
+    let ours = |of: fn(&CycleTimes) -> u64| Percentiles::of_ns(measured.ours.iter().map(of));
     let missed: u64 = measured.ours.iter().map(|t| u64::from(t.missed)).sum();
     let (wake, compute) = (ours(|t| t.wake_ns), ours(|t| t.compute_ns));
     let (receive, send) = (ours(|t| t.receive_ns), ours(|t| t.send_ns));
-    let bare = percentiles(measured.bare);
+    let bare = Percentiles::of_ns(measured.bare);
     let (cyclictest, no_cyclictest) = match measured.cyclictest {
-        Ok(late_ns) => (Some(percentiles(late_ns)), None),
+        Ok(late_ns) => (Some(Percentiles::of_ns(late_ns)), None),
         Err(reason) => (None, Some(reason.to_string())),
     };
     let rows = [
@@ -122,36 +122,14 @@ fn verdict(held: bool) -> &'static str {
     if held { "within" } else { "NOT within" }
 }
 
-/// Percentiles of samples in nanoseconds, by nearest rank; zero without any.
-pub(super) fn percentiles(samples_ns: impl IntoIterator<Item = u64>) -> Percentiles {
-    let mut sorted: Vec<u64> = samples_ns.into_iter().collect();
-    sorted.sort_unstable();
-    let at_us = |per_mille: usize| {
-        let rank = (sorted.len() * per_mille).div_ceil(1000).max(1);
-        sorted.get(rank - 1).map_or(0.0, |ns| *ns as f64 * 1e-3)
-    };
-    Percentiles {
-        count: sorted.len() as u64,
-        p50_us: at_us(500),
-        p99_us: at_us(990),
-        p999_us: at_us(999),
-        max_us: at_us(1000),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_are_samples_by_nearest_rank_and_ratios_are_judged() {
-        let ours = percentiles((1..=1000).map(|k| k * 1000));
-        let found = [ours.p50_us, ours.p99_us, ours.p999_us, ours.max_us];
-        let mut pairs = found.iter().zip([500.0, 990.0, 999.0, 1000.0]);
-        let near = pairs.all(|(g, w)| (g - w).abs() < 1e-9);
-        assert!(near, "{ours:?}");
-        assert_eq!(percentiles([]).count, 0);
-        let slower = percentiles((1..=1000).map(|k| k * 1200));
+    fn ratios_are_judged() {
+        let ours = Percentiles::of_ns((1..=1000).map(|k| k * 1000));
+        let slower = Percentiles::of_ns((1..=1000).map(|k| k * 1200));
         assert!(compare(&ours, &slower).1 && !compare(&slower, &ours).1);
     }
 }

@@ -5,7 +5,7 @@ use super::score::not_scored;
 use crate::cli::{CalibCommand, ShownArgs};
 use anyhow::{Context, bail};
 use camera_ingest::calib::board::{Board, BoardError};
-use camera_ingest::calib::extrinsics::{Residual, Sighted, residual, solve};
+use camera_ingest::calib::extrinsics::{Correspondence, Residual, residual, solve};
 use camera_ingest::calib::placed_camera_toml;
 use camera_ingest::score::sight_lead;
 use camera_ingest::source::FrameSource;
@@ -48,7 +48,7 @@ fn read_shown(path: &Path, frames: usize) -> anyhow::Result<Vec<(usize, Vector3<
 }
 
 /// What the camera saw of what it was shown.
-fn look(args: &ShownArgs, camera: &StereoCamera, stage: &Stage) -> Outcome<Vec<Sighted>> {
+fn look(args: &ShownArgs, camera: &StereoCamera, stage: &Stage) -> Outcome<Vec<Correspondence>> {
     let mut video = open_video(&args.film.video, args.film.fps).or_input()?;
     stage.say("looking");
     match (&args.board, &args.lead, args.lead_rgb) {

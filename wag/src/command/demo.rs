@@ -158,7 +158,7 @@ impl<'a> Demo<'a> {
         let calibration = rig_config.camera.stereo_camera();
         let (conf, mode) = (Path::new("camera.conf"), VideoMode::Vga);
         write_factory_conf(&folder.path.join(conf), &calibration, mode)?;
-        write_camera_toml(&folder.file("camera.toml"), &calibration, mode, conf)?;
+        write_camera_toml(&folder.file(files::CAMERA), &calibration, mode, conf)?;
         let target_m = Some(record.target_m);
         pipeline::start_recorder(session, folder, &limits, Some(&calibration), target_m)?;
         let (rig, address) = pipeline::start_rig(session, folder, rig_config)?;

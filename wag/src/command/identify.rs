@@ -1,6 +1,6 @@
 //! `wag identify`: rope parameters from a video or from keypoints.
 
-use super::filmed::{ClampMotion, Filmed};
+use super::film_input::{FilmInput, named_motion};
 use super::learned::Learned;
 use super::network::{network, no_model_without_network, warning_of_pole};
 use super::plan::LOOK;
@@ -15,7 +15,7 @@ use planner::PlannerConfig;
 use planner::identify::{IdentifyOptions, Method};
 use planner::observation::{Appearance, Observation, ObservedPoints};
 use rope_sim::AttachMotion;
-use run_log::files;
+use run_log::{ClampMotion, files};
 use serde_json::{Value, json};
 use shared_types::rope::{Ambiguity, RANGES};
 use shared_types::{KeypointTrack, RopeEstimate, RopeParams, StereoCamera};
@@ -48,12 +48,12 @@ fn read_keypoints(path: &Path) -> anyhow::Result<KeypointTrack> {
 fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     if let Some(path) = &args.observation.keypoints {
         let camera = args.scene.camera().or_input()?;
-        let clamp = ClampMotion::read(&args.scene).or_input()?;
+        let clamp = named_motion(&args.scene).or_input()?;
         let motion = clamp.attach().or_input()?;
         let track = read_keypoints(path).or_input()?;
         let film_s = track.frames.last().map_or(0.0, |frame| frame.t_s);
         clamp.check_covers(film_s).or_input()?;
-        confirm(&track.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
+        confirm(&track.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
         let warnings: Vec<_> = other_pole(&clamp, method).into_iter().collect();
         for warning in &warnings {
             eprintln!("warning: {warning}");
@@ -71,7 +71,7 @@ fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
             "name the observation with --video or --keypoints"
         ));
     };
-    let mut filmed = Filmed::open(video, args.fps, &args.scene)?;
+    let mut filmed = FilmInput::open(video, args.fps, &args.scene)?;
     filmed.warnings.extend(other_pole(&filmed.motion, method));
     filmed.warn();
     // Before the long work: what the simulator needs of the motion.
@@ -81,12 +81,12 @@ fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     let mut learned = Learned::load(None, file)?;
     let (frames, result) = track_video(&mut filmed, &mut learned, KEYPOINTS, &stage)?;
     stage.done(&format!("{} frames", frames.len()));
-    if !result.track.doubts.is_empty() {
+    if !result.track.unconfirmed.is_empty() {
         let sheet = args.out.with_extension("track.png");
         let picture = overlay(&sheet, &frames, &result.track).or_failed()?;
         files::write_atomic(&sheet, &picture).or_failed()?;
         let look = format!("look at `{}`", sheet.display());
-        confirm(&result.track.doubts, args.accept_unconfirmed, &look).or_failed()?;
+        confirm(&result.track.unconfirmed, args.accept_unconfirmed, &look).or_failed()?;
     }
     let appearance = Appearance {
         rope_radius_m: Some(result.appearance.rope_radius_m),
@@ -155,7 +155,7 @@ fn print_remarks(estimate: &RopeEstimate) {
     for ambiguity in &estimate.posterior.ambiguities {
         println!("{}", in_words(ambiguity));
     }
-    if estimate.out_of_distribution.is_outside() {
+    if estimate.out_of_distribution.is_flagged() {
         println!(
             "the rope is outside the known ranges (score {:.1}, limit {:.1}): {}",
             estimate.out_of_distribution.score,
@@ -165,7 +165,7 @@ fn print_remarks(estimate: &RopeEstimate) {
     }
     if estimate.method.as_str() == planner::identify::WIDE {
         println!("it was fitted again, by a search without ranges");
-    } else if estimate.out_of_distribution.is_outside() {
+    } else if estimate.out_of_distribution.is_flagged() {
         println!("--method hybrid fits it again by a search without ranges");
     }
 }
@@ -201,7 +201,7 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
         "residual {:.2} px, {} simulations",
         estimate.residual_px, estimate.simulations
     ));
-    files::write_rope_estimate(&args.out, &estimate, &observed.track.doubts).or_failed()?;
+    files::write_rope_estimate(&args.out, &estimate, &observed.track.unconfirmed).or_failed()?;
     println!(
         "{}\nresidual {:.2} px -> `{}`",
         parameter_table(&estimate),
@@ -215,7 +215,7 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
         "simulations": estimate.simulations, "time_offset_s": estimate.time_offset_s,
         "method": estimate.method, "posterior": estimate.posterior,
         "circumstances": estimate.circumstances, "warnings": observed.warnings,
-        "doubts": observed.track.doubts,
+        "unconfirmed": observed.track.unconfirmed,
         "out_of_distribution": estimate.out_of_distribution,
         "out_of_distribution_score": estimate.out_of_distribution.score,
     })))

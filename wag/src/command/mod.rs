@@ -10,7 +10,7 @@ mod demo;
 mod doctor;
 mod dry_run;
 mod film;
-mod filmed;
+mod film_input;
 mod identify;
 mod latency;
 mod learned;
@@ -19,6 +19,7 @@ mod manual;
 mod network;
 mod on_arm;
 mod plan;
+mod plan_again;
 mod process;
 mod record;
 mod rig;
@@ -52,6 +53,7 @@ fn results(command: &Command) -> Vec<&Path> {
         Command::Plan(
             PlanCommand::Strike(args) | PlanCommand::Lob(args) | PlanCommand::Drape(args),
         ) => &[Some(&args.out), args.csv.as_deref(), args.reach.as_deref()],
+        Command::Plan(PlanCommand::Again(args)) => &[Some(&args.out)],
         Command::Latency(args) => &[args.response.as_deref()],
         Command::Report { out, .. } => &[out.as_deref()],
         Command::Ledger(args) => &[args.csv.as_deref()],
@@ -77,6 +79,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Plan(PlanCommand::Strike(args)) => plan::run(Task::Strike, args),
         Command::Plan(PlanCommand::Lob(args)) => plan::run(Task::Lob, args),
         Command::Plan(PlanCommand::Drape(args)) => plan::run(Task::Drape, args),
+        Command::Plan(PlanCommand::Again(args)) => plan_again::run(args),
         Command::Check(args) => check::run(args),
         Command::Throw(args) => throw::run(args),
         Command::Latency(args) => latency::run(args),

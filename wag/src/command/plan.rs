@@ -3,7 +3,7 @@
 use super::unconfirmed::confirm;
 use crate::cli::PlanArgs;
 use crate::config;
-use anyhow::{Context, bail, ensure};
+use anyhow::{bail, ensure};
 use arm_model::Limits;
 use cli_output::{Failure, OrInput, Outcome, Stage, output};
 use planner::PlannerConfig;
@@ -18,7 +18,7 @@ use shared_types::{Plan, Task};
 use std::path::Path;
 
 /// Bad requests are the caller's; everything else is a failure of the work.
-fn classify(error: PlanError) -> Failure {
+pub fn classify(error: PlanError) -> Failure {
     Failure::of(error.is_input(), error)
 }
 
@@ -33,26 +33,23 @@ fn check_fault(plan: &Plan, args: &PlanArgs) -> anyhow::Result<()> {
     }
 }
 
-/// Where a doubt about an identified rope can be looked at.
+/// Where a reason about an identified rope can be looked at.
 pub const LOOK: &str =
     "look at an overlay of the film that it was identified from (`wag track --overlay`)";
 
-/// Ropes that a forecast is made with.
-const FORECAST_ROPES: usize = 64;
-
-/// What is known about the rope beyond its parameters, for `--robust`.
+/// What is known about the rope beyond its parameters, for forecast and `--robust`.
 fn ensemble(args: &PlanArgs) -> anyhow::Result<PosteriorEnsemble> {
-    if args.robust == 0 {
-        return Ok(PosteriorEnsemble::default());
-    }
     let rope = files::read_rope(&args.rope)?;
-    let posterior = files::read_posterior(&args.rope)?.with_context(|| {
-        format!(
+    let Some(posterior) = files::read_posterior(&args.rope)? else {
+        ensure!(
+            args.robust == 0,
             "rope file `{}` has no table `posterior`: --robust needs a rope identified by this version",
             args.rope.display()
-        )
-    })?;
-    let drawn = PosteriorEnsemble::drawn(&rope, &posterior, args.robust, FORECAST_ROPES, args.seed);
+        );
+        return Ok(PosteriorEnsemble::default());
+    };
+    let forecast = PosteriorEnsemble::FORECAST;
+    let drawn = PosteriorEnsemble::drawn(&rope, &posterior, args.robust, forecast, args.seed);
     let count = drawn.optimised.len();
     ensure!(
         count == args.robust,
@@ -100,8 +97,8 @@ pub fn describe(plan: &Plan) -> String {
 
 pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
-    let doubts = files::read_doubts(&args.rope).or_input()?;
-    confirm(&doubts, args.accept_unconfirmed, LOOK).or_failed()?;
+    let unconfirmed = files::read_unconfirmed(&args.rope).or_input()?;
+    confirm(&unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
     let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
     let config: PlannerConfig = config::here(args.config.as_deref()).or_input()?;
     let ensemble = ensemble(args).or_input()?;
@@ -129,7 +126,7 @@ pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
         following: response.map(|r| Following::new(&r, &limits)),
     };
     let mut plan = planner::plan(&request, &mut |p| stage.go_on(&p)).map_err(classify)?;
-    plan.doubts = doubts;
+    plan.unconfirmed = unconfirmed;
     let warnings = warnings(&plan);
     check_fault(&plan, args).or_failed()?;
     stage.done(&describe(&plan));

@@ -18,8 +18,9 @@ pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     let stage = Stage::begin("score");
     let found = score(&mut video, &camera, args.tip_rgb.0, args.target_rgb.0)
         .map_err(|error| not_scored(error, &args.film.video))?;
+    let [x, y, z] = found.miss_m;
     let line = format!(
-        "closest approach {:.1} mm ({:.1} to {:.1}) at {:.4} s",
+        "closest approach {:.1} mm ({:.1} to {:.1}) at {:.4} s; miss {x:.4},{y:.4},{z:.4} m (tip minus target)",
         1e3 * found.closest_m,
         1e3 * found.interval_m[0],
         1e3 * found.interval_m[1],
@@ -28,7 +29,7 @@ pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     stage.done("tip and target measured");
     println!("{line}");
     Ok(Some(json!({
-        "ok": true, "command": "score", "closest_m": found.closest_m, "interval_m": found.interval_m,
+        "ok": true, "command": "score", "closest_m": found.closest_m, "interval_m": found.interval_m, "miss_m": found.miss_m,
         "time_s": found.time_s, "target_m": found.target_m,
     })))
 }

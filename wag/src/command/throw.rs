@@ -122,7 +122,7 @@ pub fn drive(
 
 pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
     let plan = read_plan(&args.plan).or_input()?;
-    confirm(&plan.doubts, args.accept_unconfirmed, LOOK).or_failed()?;
+    confirm(&plan.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
     config::cell_for(&plan).or_input()?;
     let address = reach_measured(&args.arm)?;
     if let Some(address) = &address {

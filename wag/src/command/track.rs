@@ -1,6 +1,6 @@
 //! `wag track`: keypoints of the rope from a recording.
 
-use super::filmed::Filmed;
+use super::film_input::FilmInput;
 use super::learned::{Learned, classify};
 use crate::cli::TrackArgs;
 use camera_ingest::film::keypoint_film;
@@ -20,7 +20,7 @@ const SHEET: (usize, usize) = (12, 3);
 /// Tracks the rope through a film; a learned tracker reads it where there is one. The
 /// left-eye frames, and what was found in them.
 pub fn track_video(
-    filmed: &mut Filmed,
+    filmed: &mut FilmInput,
     learned: &mut Learned,
     keypoints: usize,
     stage: &Stage,
@@ -84,7 +84,7 @@ pub fn run(args: &TrackArgs) -> Outcome<Option<Value>> {
             shared_types::keypoints::MAX_KEYPOINTS
         ));
     }
-    let mut filmed = Filmed::open(&args.video, args.fps, &args.scene)?;
+    let mut filmed = FilmInput::open(&args.video, args.fps, &args.scene)?;
     filmed.warn();
     let file = args.scene.camera.as_deref();
     let mut learned = Learned::load(Some(&args.models), file)?;
@@ -100,12 +100,12 @@ pub fn run(args: &TrackArgs) -> Outcome<Option<Value>> {
         result.track.frames.iter().filter(|f| wanted(f)).count()
     };
     let lost = frames_in(|f| f.lost);
-    let doubted = frames_in(|f| !f.lost && f.confidence.iter().all(|c| *c <= 0.5));
+    let unconfirmed_frames = frames_in(|f| !f.lost && f.confidence.iter().all(|c| *c <= 0.5));
     let seconds = stage.done(&format!(
-        "{count} frames, rope lost in {lost}, unconfirmed in {doubted}"
+        "{count} frames, rope lost in {lost}, unconfirmed in {unconfirmed_frames}"
     ));
-    for doubt in &result.track.doubts {
-        eprintln!("warning: the track is unconfirmed: {doubt}");
+    for reason in &result.track.unconfirmed {
+        eprintln!("warning: the track is unconfirmed: {reason}");
     }
     if let Some(clamp) = result.clamp {
         println!("{}", said(&clamp));
@@ -117,7 +117,7 @@ pub fn run(args: &TrackArgs) -> Outcome<Option<Value>> {
     println!("keypoints written to `{}`", args.out.display());
     Ok(Some(json!({
         "ok": true, "command": "track", "out": args.out, "frames": count,
-        "lost": lost, "doubted": doubted, "doubts": result.track.doubts, "warnings": filmed.warnings, "seconds": seconds, "models": learned.report(),
+        "lost": lost, "unconfirmed_frames": unconfirmed_frames, "unconfirmed": result.track.unconfirmed, "warnings": filmed.warnings, "seconds": seconds, "models": learned.report(),
         "rope_radius_m": result.appearance.rope_radius_m,
         "lead_radius_m": result.appearance.lead_radius_m,
         "clamp": result.clamp.map(|c| json!({

@@ -4,16 +4,16 @@ use anyhow::bail;
 
 /// Stops at an unconfirmed track; with `accepted` it is a warning only. `look` says where it
 /// can be looked at.
-pub fn confirm(doubts: &[String], accepted: bool, look: &str) -> anyhow::Result<()> {
-    if doubts.is_empty() {
+pub fn confirm(unconfirmed: &[String], accepted: bool, look: &str) -> anyhow::Result<()> {
+    if unconfirmed.is_empty() {
         return Ok(());
     }
-    let doubts = doubts.join("; ");
+    let unconfirmed = unconfirmed.join("; ");
     if accepted {
-        eprintln!("warning: the track is unconfirmed: {doubts}");
+        eprintln!("warning: the track is unconfirmed: {unconfirmed}");
         return Ok(());
     }
     bail!(
-        "the track of the rope is unconfirmed: {doubts}; {look}, then mend the film or its files, or go on with --accept-unconfirmed"
+        "the track of the rope is unconfirmed: {unconfirmed}; {look}, then mend the film or its files, or go on with --accept-unconfirmed"
     )
 }

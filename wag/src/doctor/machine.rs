@@ -114,7 +114,7 @@ impl Machine<'_> {
                 "isolated core",
                 Verdict::warn_unless(!isolated.is_empty()),
                 listed(std::slice::from_ref(&isolated), "none"),
-                "isolcpus=N nohz_full=N rcu_nocbs=N on the kernel's command line, cpu = N in [real_time]",
+                "isolcpus=N nohz_full=N rcu_nocbs=N on the kernel's command line, cpu = N in `[real_time]` of rt-controller.toml",
             ),
             Finding::new(
                 "clock source",

@@ -38,13 +38,13 @@ pub(crate) fn prepare() -> tempfile::TempDir {
         put(name, &ROPE.replace(value, wrong));
     }
     put("unknown.toml", &format!("{ROPE}wibble = 3\n"));
-    let doubts = "[fit]\ndoubts = [\"the rope's end is not confirmed\"]\n";
-    put("doubted.toml", &format!("{ROPE}{doubts}"));
+    let unconfirmed = "[fit]\ndoubts = [\"the rope's end is not confirmed\"]\n";
+    put("unconfirmed.toml", &format!("{ROPE}{unconfirmed}"));
     let (rope, here) = (toml::from_str::<RopeParams>(ROPE).unwrap(), START_POSE);
     let still = JointTrajectory::new(&[0.0, 1.0], &[here, here]).unwrap();
-    let mut doubted = plan_json(&still, &rope);
-    doubted["doubts"] = ["the rope's end is not confirmed"].into();
-    put("doubted.json", &doubted.to_string());
+    let mut unconfirmed = plan_json(&still, &rope);
+    unconfirmed["unconfirmed"] = ["the rope's end is not confirmed"].into();
+    put("unconfirmed.json", &unconfirmed.to_string());
     put("pose.csv", &pose_csv());
     for (name, row, wrong) in [
         ("nan.csv", "0.010,0,", "0.010,nan,"),

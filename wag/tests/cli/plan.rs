@@ -1,13 +1,38 @@
 //! `wag plan`: broken off, it leaves the best throw so far, marked as such.
 
 use super::files::ROPE;
-use super::support::{command, send};
+use super::support::{are_refused_in, command, plan_json, send, throw};
 use rustix::process::Signal;
 use serde_json::Value;
 use std::time::Duration;
 
 /// A search that would last for hours.
 const ENDLESS: &str = "[search]\ngenerations = 1000000\npopulation = 2000\n";
+
+#[test]
+fn a_correction_without_a_miss_or_a_throw_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+    let rope = toml::from_str(ROPE).unwrap();
+    let plan = plan_json(&throw([0.0, 0.0]), &rope);
+    put("plan.json", &plan.to_string());
+    std::fs::create_dir(dir.path().join("run")).unwrap();
+    put("run/plan.json", &plan.to_string());
+    put("run/summary.json", "{\"ok\": true}");
+    put("rope.toml", ROPE);
+    are_refused_in(
+        dir.path(),
+        2,
+        "plan again plan.json --out p.json => --miss | wag score
+         plan again run --out p.json => summary.json | --miss
+         plan again gone.json --miss 0,0,0.01 --out p.json => gone.json
+         plan again rope.toml --miss 0,0,0.01 --out p.json => `rope.toml` is no plan
+         plan again plan.json --miss 0,0.2,0 --out p.json => 20.0 cm
+         plan again plan.json --miss 0,0,0.01 --out p.json => number of waypoints
+         plan again plan.json --miss nan,0,0 --out p.json => finite",
+    );
+    assert!(!dir.path().join("p.json").exists());
+}
 
 #[test]
 fn an_interrupt_leaves_the_best_plan_so_far() {

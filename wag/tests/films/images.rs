@@ -91,13 +91,13 @@ fn pictures_and_raw_files_are_tracked_like_the_film() {
     };
     assert!(track("raw_1344x376.yuyv", "drawn/film.avi") == expected);
     assert!(track(".", "drawn/sheet.png") == expected);
-    let doubted = KeypointTrack {
-        doubts: vec!["the rope's end is not confirmed".to_owned()],
+    let unconfirmed = KeypointTrack {
+        unconfirmed: vec!["the rope's end is not confirmed".to_owned()],
         ..expected
     };
-    let text = serde_json::to_string(&doubted).unwrap();
-    fs::write(dir.path().join("doubted.json"), text).unwrap();
-    let case = "identify --keypoints doubted.json --out r.toml";
+    let text = serde_json::to_string(&unconfirmed).unwrap();
+    fs::write(dir.path().join("unconfirmed.json"), text).unwrap();
+    let case = "identify --keypoints unconfirmed.json --out r.toml";
     let words = "end is not confirmed | --accept-unconfirmed";
     are_refused_in(dir.path(), 1, &format!("{case} {own} => {words}"));
     let film = open_video(&dir.path().join("drawn/film.avi"), None).unwrap();

@@ -1,7 +1,8 @@
 //! Killing any process of a demo at a random moment: it is reported within
 //! three seconds, nothing is left running, and the next demo succeeds.
 
-use crate::support::{alone, command, process_of, processes_of, said, send, until};
+use crate::support::{alone, command, json_in, process_of, processes_of, said, send, until};
+use arm_model::Limits;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustix::process::Signal;
@@ -83,4 +84,30 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
         assert!(run.join(file).is_file(), "{file} is missing");
     }
     nothing_left(&run, Duration::from_millis(100));
+
+    // Its next throw aims as far on the other side of the target.
+    let score = &reported["score"];
+    let again = json_in(folder.path(), "plan again after --out again.json");
+    assert_eq!(again["miss_m"], score["miss_m"], "{score}");
+    let at = |value: &serde_json::Value, axis: usize| value[axis].as_f64().unwrap();
+    let square = |axis| at(&score["miss_m"], axis).powi(2);
+    let miss_m = (0..3).map(square).sum::<f64>().sqrt();
+    assert!((miss_m - score["closest_m"].as_f64().unwrap()).abs() < 1e-9);
+    for axis in 0..3 {
+        let aside_m = at(&again["target_m"], axis) - at(&again["aim_m"], axis);
+        assert!(
+            (aside_m - at(&again["miss_m"], axis)).abs() < 1e-12,
+            "{again}"
+        );
+    }
+    assert!(
+        again["predicted_error_m"].as_f64().unwrap() < 1e-3,
+        "{again}"
+    );
+    let corrected = run_log::files::read_plan(&folder.path().join("again.json")).unwrap();
+    assert!(
+        Limits::default()
+            .worst_violation(&corrected.trajectory)
+            .is_none()
+    );
 }

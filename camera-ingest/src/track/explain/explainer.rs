@@ -10,8 +10,8 @@ use super::evidence::Lit;
 use super::hypothesis::{Fidelity, MIDDLE, Point, SPREAD, Seen, Setup, Side};
 use super::read::{NODES, Reader};
 use super::reading::Reading;
-use super::refine::{Fit, Sighting};
-use super::search::{Moment, Searcher, side_by_side};
+use super::refine::{Detection, Fit};
+use super::search::{EvidenceFrame, Searcher, side_by_side};
 use super::statistics::quantile;
 use crate::track::TrackError;
 
@@ -32,7 +32,7 @@ pub(super) struct Explainer<'a> {
     frames: Vec<Lit<'a>>,
     /// Starts of the frames' exposures.
     times_s: &'a [f64],
-    moments: Vec<Moment>,
+    moments: Vec<EvidenceFrame>,
 }
 
 /// A hypothesis, and what was read off the film along it.
@@ -58,7 +58,7 @@ impl<'a> Explainer<'a> {
             let mut maps = vec![blurred(Side::Left, &frames[i])];
             let right = right.zip(film.right_at(film.left[i].stamp_ns));
             maps.extend(right.map(|(scene, frame)| blurred(Side::Right, &Lit::of(frame, scene))));
-            Moment {
+            EvidenceFrame {
                 t_s: times_s[i],
                 maps,
             }
@@ -125,11 +125,11 @@ impl<'a> Explainer<'a> {
             return Ok(x);
         };
         let times_s = self.times_s.iter().step_by(every).enumerate();
-        let sightings: Vec<Sighting> = times_s
-            .map(|(frame, t_s)| Sighting::of(&reading, frame, *t_s))
+        let detections: Vec<Detection> = times_s
+            .map(|(frame, t_s)| Detection::of(&reading, frame, *t_s))
             .collect();
         let fit = Fit {
-            sightings: &sightings,
+            detections: &detections,
             setup,
             fidelity,
         };

@@ -31,7 +31,7 @@ const PULL: f64 = 1e-3;
 
 /// How offsets are looked for.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Look {
+pub(super) struct ProfileSearch {
     /// To either side (px).
     pub(super) reach: usize,
     /// Half the rope's width (px).
@@ -42,7 +42,11 @@ pub(super) struct Look {
 
 /// Offsets of all nodes of one frame, along the curve's normals. `at` gives evidence (0 to
 /// 1) at a place.
-pub(super) fn offsets(points: &[Pixel], look: Look, at: impl Fn(Pixel) -> f32) -> Vec<Offset> {
+pub(super) fn offsets(
+    points: &[Pixel],
+    look: ProfileSearch,
+    at: impl Fn(Pixel) -> f32,
+) -> Vec<Offset> {
     let width = 2 * look.reach + 1;
     let mut profiles = Vec::with_capacity(points.len() * width);
     for (p, n) in points.iter().zip(normals(points)) {
@@ -195,7 +199,7 @@ mod tests {
             let edge = (3.5 - (p.x - 54.3).abs()).clamp(0.0, 1.0) as f32;
             if stray { 1.0 } else { edge }
         };
-        let look = Look {
+        let look = ProfileSearch {
             reach: 12,
             half_width_px: 3.0,
             jump: 0.05,

@@ -6,7 +6,7 @@ use super::disc::Disc;
 use super::end::{self, End};
 use super::ends::{END_REACH, EndPicture, Window, start_px};
 use super::evidence::Lit;
-use super::field::{Look, Offset, moved, offsets, smooth_field, smoothed};
+use super::field::{Offset, ProfileSearch, moved, offsets, smooth_field, smoothed};
 use super::reading::Reading;
 use super::round::{self, Profile, Round};
 use super::statistics::median;
@@ -91,7 +91,7 @@ impl<'a> Reader<'a> {
     /// curves' beginning on.
     pub(super) fn read(mut self, reported_px: f64) -> Reading {
         // First, whatever the scene does not explain.
-        let look = Look {
+        let look = ProfileSearch {
             reach: FIRST_REACH,
             half_width_px: UNKNOWN_HALF_PX,
             jump: 0.02,
@@ -119,7 +119,7 @@ impl<'a> Reader<'a> {
             reported_px + SEEN_PART * (seen - reported_px)
         });
         // Then what has the rope's colours.
-        let look = Look {
+        let look = ProfileSearch {
             reach: SECOND_REACH,
             half_width_px: end.rope_half_px,
             jump: 0.05,
@@ -174,7 +174,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Where evidence lies across the curves.
-    fn look(&self, look: Look, at: impl Fn(&Lit<'_>, Pixel) -> f32) -> Vec<Vec<Offset>> {
+    fn look(&self, look: ProfileSearch, at: impl Fn(&Lit<'_>, Pixel) -> f32) -> Vec<Vec<Offset>> {
         let frames = self.frames.iter().zip(&self.curves);
         frames
             .map(|(lit, curve)| offsets(curve, look, |p| at(lit, p)))

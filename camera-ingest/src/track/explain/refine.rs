@@ -36,7 +36,7 @@ type Vector = SVector<f64, FREE>;
 
 /// What was read off one frame.
 #[derive(Debug)]
-pub(super) struct Sighting {
+pub(super) struct Detection {
     t_s: f64,
     /// Index, place, unit normal and weight of nodes.
     nodes: Vec<(usize, Pixel, Pixel, f64)>,
@@ -44,7 +44,7 @@ pub(super) struct Sighting {
     tip_weight: f64,
 }
 
-impl Sighting {
+impl Detection {
     pub(super) fn of(reading: &Reading, frame: usize, t_s: f64) -> Self {
         let curve = &reading.curves[frame];
         let shown = reading.end.nodes_shown(curve);
@@ -77,7 +77,7 @@ impl Sighting {
 
 /// What a hypothesis is fitted to.
 pub(super) struct Fit<'a> {
-    pub(super) sightings: &'a [Sighting],
+    pub(super) detections: &'a [Detection],
     pub(super) setup: Setup<'a>,
     pub(super) fidelity: Fidelity,
 }
@@ -129,8 +129,8 @@ impl Fit<'_> {
         let seen = self.setup.simulate(points, self.fidelity)?;
         let misses = |seen: Option<Seen>| {
             let mut out = Vec::new();
-            for sighting in self.sightings {
-                sighting.add_misses(seen.as_ref()?, &mut out)?;
+            for detection in self.detections {
+                detection.add_misses(seen.as_ref()?, &mut out)?;
             }
             Some(out)
         };
@@ -138,7 +138,7 @@ impl Fit<'_> {
     }
 
     fn prior(&self) -> f64 {
-        PRIOR * self.sightings.len() as f64
+        PRIOR * self.detections.len() as f64
     }
 
     /// Cauchy's: squares near 0, hardly more further off.
@@ -247,7 +247,7 @@ mod tests {
                 .map(|t_s| (t_s, seen.curve(t_s, Side::Left, NODES).unwrap()))
                 .collect()
         };
-        let sighting = |(t_s, curve): &(f64, Vec<Pixel>)| {
+        let detection = |(t_s, curve): &(f64, Vec<Pixel>)| {
             let node = |(k, n): (usize, Pixel)| {
                 // Every sixth place shows something twelve pixels to the side.
                 let aside = if (k + (t_s * 10.0) as usize).is_multiple_of(6) {
@@ -258,7 +258,7 @@ mod tests {
                 (k, curve[k] + n * aside, n, 1.0)
             };
             let nodes = normals(curve).enumerate().map(node);
-            Sighting {
+            Detection {
                 t_s: *t_s,
                 nodes: nodes.skip(EVERY / 2).step_by(EVERY).collect(),
                 tip: curve[NODES - 1],
@@ -267,7 +267,7 @@ mod tests {
         };
         let there = curves(&truth);
         let fit = Fit {
-            sightings: &there.iter().map(sighting).collect::<Vec<_>>(),
+            detections: &there.iter().map(detection).collect::<Vec<_>>(),
             setup,
             fidelity: Fidelity::COARSE,
         };

@@ -4,7 +4,7 @@ use rope_sim::AttachMotion;
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, StereoCamera};
 
-use super::super::confirmation::{Confirmation, DOUBT};
+use super::super::confirmation::{Confirmation, UNCONFIRMED};
 use super::super::plane::RopePlane;
 use super::super::{RopeAppearance, TrackError, TrackResult, TrackTimes, timing};
 use super::colour::{CHROMA_WEIGHT, Colour};
@@ -91,11 +91,11 @@ pub(super) fn result(
         tip: quantile(reading.tips.iter().map(|[_, aside]| aside.weight), 0.5),
         second_image: testimony.map(Testimony::confirmed),
     };
-    let doubts = confirmation.doubts(&frames);
-    if !doubts.is_empty() {
+    let unconfirmed = confirmation.unconfirmed(&frames);
+    if !unconfirmed.is_empty() {
         // Nothing is certain in a track that is unconfirmed as a whole.
         let all = frames.iter_mut().flat_map(|f| &mut f.confidence);
-        all.for_each(|c| *c *= DOUBT);
+        all.for_each(|c| *c *= UNCONFIRMED);
     }
     let predicted = |t_s: f64| {
         let seen = |t_s: f64| camera.project_left(&motion.at(t_s).p_m);
@@ -109,7 +109,7 @@ pub(super) fn result(
         track: KeypointTrack {
             keypoints,
             frames,
-            doubts,
+            unconfirmed,
         },
         appearance: RopeAppearance {
             rope_radius_m,

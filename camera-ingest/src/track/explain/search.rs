@@ -40,7 +40,7 @@ const NOTHING: f64 = -10.0;
 
 /// Blurred evidence of one moment.
 #[derive(Debug)]
-pub(super) struct Moment {
+pub(super) struct EvidenceFrame {
     /// Start of the frame's exposure (s).
     pub(super) t_s: f64,
     /// Left image's, and the right one's where there is one.
@@ -57,7 +57,7 @@ pub(super) struct Found {
 
 /// A film's evidence, and what moves the rope in it.
 pub(super) struct Searcher<'a> {
-    pub(super) moments: &'a [Moment],
+    pub(super) moments: &'a [EvidenceFrame],
     pub(super) setup: Setup<'a>,
 }
 

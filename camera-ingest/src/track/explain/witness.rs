@@ -9,7 +9,7 @@ use super::colour::{Colour, SHADES, shaded};
 use super::curve::Pixel;
 use super::evidence::Lit;
 use super::explainer::Explained;
-use super::field::{Look, Offset, offsets};
+use super::field::{Offset, ProfileSearch, offsets};
 use super::hypothesis::Side;
 use super::read::NODES;
 use super::statistics::{mean, median};
@@ -25,7 +25,7 @@ const COMMON_PX: f64 = 4.0;
 const MIN_WEIGHT: f64 = 0.3;
 
 /// One frame of the second image.
-struct Sight<'a> {
+struct View<'a> {
     /// Index of the first image's frame of the same time.
     index: usize,
     frame: &'a ImageFrame,
@@ -51,7 +51,7 @@ impl Testimony {
         times_s: &[f64],
         found: &Explained,
     ) -> Option<Self> {
-        let sight = |frame| {
+        let view = |frame| {
             let stamp_ns = |f: &ImageFrame| f.stamp_ns;
             let index = film.left.binary_search_by_key(&stamp_ns(frame), stamp_ns);
             let index = index.ok()?;
@@ -60,38 +60,38 @@ impl Testimony {
             for (p, (predicted, read)) in curve.iter_mut().zip(left) {
                 *p = *p + read - predicted;
             }
-            Some(Sight {
+            Some(View {
                 index,
                 frame,
                 curve,
             })
         };
-        let sights: Vec<Sight<'_>> = film.right.iter().filter_map(sight).collect();
+        let views: Vec<View<'_>> = film.right.iter().filter_map(view).collect();
         let rope = &found.reading.rope;
-        Self::from_sights(scene, &sights, rope, found.reading.end.rope_half_px)
+        Self::from_views(scene, &views, rope, found.reading.end.rope_half_px)
     }
 
     /// Looks for the rope's colours where it should be.
-    fn from_sights(
+    fn from_views(
         scene: &Scene,
-        sights: &[Sight<'_>],
+        views: &[View<'_>],
         rope: &[Colour],
         half_width_px: f64,
     ) -> Option<Self> {
-        if sights.is_empty() {
+        if views.is_empty() {
             return None;
         }
-        let look = Look {
+        let look = ProfileSearch {
             reach: REACH_PX,
             half_width_px,
             jump: 0.05,
         };
         let rope = shaded(rope, &SHADES);
-        let offsets = |sight: &Sight<'_>| {
-            let lit = Lit::of(sight.frame, scene);
-            offsets(&sight.curve, look, |p| lit.present(&rope, p))
+        let offsets = |view: &View<'_>| {
+            let lit = Lit::of(view.frame, scene);
+            offsets(&view.curve, look, |p| lit.present(&rope, p))
         };
-        let found: Vec<Vec<Offset>> = sights.iter().map(offsets).collect();
+        let found: Vec<Vec<Offset>> = views.iter().map(offsets).collect();
         let clear = found.iter().flatten().filter(|o| o.weight > MIN_WEIGHT);
         let common_px = median(clear.map(|o| o.px));
         let confirms = |o: &Offset| {
@@ -103,7 +103,7 @@ impl Testimony {
             .map(|offsets| offsets.iter().map(confirms).collect())
             .collect();
         let node = |k: usize| mean(&confirmed.iter().map(|c| c[k]).collect::<Vec<_>>());
-        let frames = sights.iter().zip(&confirmed);
+        let frames = views.iter().zip(&confirmed);
         Some(Self {
             frames: frames.map(|(s, c)| (s.index, mean(c))).collect(),
             nodes: (0..NODES).map(node).collect(),
@@ -156,13 +156,13 @@ mod tests {
         let confirmed = |rope_at: usize, frames: u64| {
             let frames: Vec<ImageFrame> = (0..frames).map(|i| drawn(i, Some(rope_at))).collect();
             let place = |k| Pixel::new(47.5, 10.0 + k as f64 * 1.5);
-            let sight = |(index, frame)| Sight {
+            let view = |(index, frame)| View {
                 index,
                 frame,
                 curve: (0..NODES).map(place).collect(),
             };
-            let sights: Vec<Sight<'_>> = frames.iter().enumerate().map(sight).collect();
-            Testimony::from_sights(&scene, &sights, &[[40.0, 0.0, 0.0]], 3.0).map(|t| t.confirmed())
+            let views: Vec<View<'_>> = frames.iter().enumerate().map(view).collect();
+            Testimony::from_views(&scene, &views, &[[40.0, 0.0, 0.0]], 3.0).map(|t| t.confirmed())
         };
         assert!(confirmed(48, 4).unwrap() > 0.95);
         assert!(

@@ -70,7 +70,7 @@ pub(super) fn run(args: &OtherRealityArgs) -> Outcome<Option<Value>> {
         let each = channels.len() as u64;
         let (rope, channel) = (number / each, channels[(number % each) as usize]);
         let case = Case::draw(experiment.args.seed, rope, channel, args.mujoco.refinement);
-        let fate = reality.identified(rope, &case)?;
+        let [fate] = reality.identified(rope, &case)?;
         Ok(Trial {
             rope,
             channel,

@@ -13,7 +13,7 @@
 
 use super::violation::Violation;
 use arm_model::limits::STEP_MAX_M;
-use arm_model::{JOINTS, JointVector, Limits, kinematics};
+use arm_model::{JOINTS, JointVector, Limits};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use shared_types::FaultCode;
@@ -62,7 +62,7 @@ impl Limiter {
             qdd: JointVector::ZERO,
             step_s: limits.period_s(),
             step_before_s: limits.period_s(),
-            p_w_tcp_m: tcp(&q, limits),
+            p_w_tcp_m: limits.tool_centre_point_m(&q),
             streamed_left: 0,
         }
     }
@@ -123,7 +123,7 @@ impl Limiter {
                 }
             }
         }
-        let p_w_tcp_m = tcp(q, limits);
+        let p_w_tcp_m = limits.tool_centre_point_m(q);
         check_tool((p_w_tcp_m - self.p_w_tcp_m).norm(), step_s, limits, allowed)?;
         *self = Self {
             q: *q,
@@ -152,7 +152,7 @@ impl Limiter {
         }
         let [_, slack, ..] = ROUNDING;
         let qd = (*q - self.q) * (1.0 / CONTINUOUS_S);
-        let way_m = (tcp(q, limits) - self.p_w_tcp_m).norm();
+        let way_m = (limits.tool_centre_point_m(q) - self.p_w_tcp_m).norm();
         let reached = (0..JOINTS).all(|j| within(qd[j], limits.velocity_max_rad_s[j], slack))
             && within(way_m / CONTINUOUS_S, allowed.tcp_speed_max_m_s, slack);
         if reached {
@@ -206,11 +206,6 @@ fn within(value: f64, limit: f64, rounding: f64) -> bool {
     value.abs() <= limit * (1.0 + RELATIVE) + rounding
 }
 
-fn tcp(q: &JointVector, limits: &Limits) -> Vector3<f64> {
-    let (p, r) = kinematics::flange_pose(q);
-    p + r * limits.tcp_offset()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -258,7 +253,10 @@ mod tests {
     #[test]
     fn splines_at_a_limit_pass_and_above_it_fail() {
         let limits = Limits::default();
-        let reach_m = kinematics::flange_pose(&START_POSE).0.xy().norm();
+        let reach_m = arm_model::kinematics::flange_pose(&START_POSE)
+            .0
+            .xy()
+            .norm();
         let by = 1.05 * 1.2 / reach_m / 1.5;
         let at_limit = swing(6, 20.0 * 0.25 / 6.0, 0.5);
         let above = swing(6, 20.6 * 0.25 / 6.0, 0.5);

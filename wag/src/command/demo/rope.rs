@@ -10,7 +10,7 @@ use crate::pipeline::{arm_simulated, execute};
 use anyhow::{anyhow, bail, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use cli_output::Stage;
-use planner::plan::{PlanOptions, PlanRequest, warnings};
+use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, warnings};
 use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
 use planner::settle::SettleRequest;
 use rt_controller::os::now_ns;
@@ -95,13 +95,13 @@ impl Demo<'_> {
                 lost_fraction,
                 appearance,
                 ms_per_frame,
-                doubts,
+                unconfirmed,
                 ..
             } => Tracked {
                 lost_fraction,
                 appearance,
                 ms_per_frame,
-                doubts,
+                unconfirmed,
             },
             other => bail!("the camera process answered with {other:?}"),
         };
@@ -110,11 +110,11 @@ impl Demo<'_> {
             tracked.ms_per_frame,
             100.0 * tracked.lost_fraction
         ));
-        let doubts = tracked.doubts.clone();
+        let unconfirmed = tracked.unconfirmed.clone();
         let appearance = tracked.appearance;
         self.record.track = Some(tracked);
         let look = format!("look at `{overlay}`");
-        confirm(&doubts, accept_unconfirmed, &look)?;
+        confirm(&unconfirmed, accept_unconfirmed, &look)?;
         Ok(appearance)
     }
 
@@ -143,8 +143,8 @@ impl Demo<'_> {
             other => bail!("the planner process answered with {other:?}"),
         };
         let tracked = self.record.track.as_ref();
-        let doubts = tracked.map_or(&[][..], |tracked| &tracked.doubts);
-        files::write_rope_estimate(&self.folder.file(files::ROPE), &rope, doubts)?;
+        let unconfirmed = tracked.map_or(&[][..], |tracked| &tracked.unconfirmed);
+        files::write_rope_estimate(&self.folder.file(files::ROPE), &rope, unconfirmed)?;
         self.record.stages.identify_s = stage.done(&format!(
             "length {:.3} m, residual {:.2} px, {} simulations",
             rope.params.length_m, rope.residual_px, rope.simulations
@@ -161,9 +161,11 @@ impl Demo<'_> {
             ..self.settings.search
         };
         let goal = self.settings.goal(Task::Strike, self.record.target_m);
+        let (found, forecast) = (&rope.posterior, PosteriorEnsemble::FORECAST);
         let request = PlannerRequest::Plan(Box::new(PlanRequest {
             limits: self.limits.clone(),
             cell: self.settings.cell,
+            ensemble: PosteriorEnsemble::drawn(&rope.params, found, 0, forecast, options.seed),
             ..PlanRequest::new(goal, &rope.params, options)
         }));
         let plan = match self.ask_planner(&request, PLANNING_S, &stage)? {

@@ -48,7 +48,7 @@ pub struct Tracked {
     pub ms_per_frame: f64,
     /// Why the track should not be relied on.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub doubts: Vec<String>,
+    pub unconfirmed: Vec<String>,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -127,7 +127,7 @@ impl DemoRecord {
         self.plan = Some(json!({
             "predicted_error_m": plan.predicted_error_m, "predicted_time_s": plan.predicted_time_s,
             "simulations": plan.simulations, "resampled": plan.resampled,
-            "trajectory_sha256": plan.trajectory_sha256,
+            "forecast": plan.forecast, "trajectory_sha256": plan.trajectory_sha256,
         }));
     }
 

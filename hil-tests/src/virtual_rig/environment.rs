@@ -24,7 +24,7 @@ type Link = TcpLink<VirtualStream>;
 
 /// Everything that the control cycle hears and tells.
 #[derive(Debug)]
-pub struct Surroundings {
+pub struct Environment {
     pub(super) network: Rc<RefCell<Network>>,
     joints: Feed,
     decoder: JointDecoder,
@@ -46,7 +46,7 @@ pub struct Surroundings {
     pub log: RigLog,
 }
 
-impl Surroundings {
+impl Environment {
     pub(super) fn new(arm: ArmEndpoint, start: MonotonicNs, delay_s: f64) -> Self {
         Self {
             network: Rc::new(RefCell::new(Network::new(arm, start, delay_s))),
@@ -94,7 +94,7 @@ impl Surroundings {
 }
 
 /// A living beat goes on with each cycle; what is dead leaves its last standing.
-impl CycleIo<Link> for Surroundings {
+impl CycleIo<Link> for Environment {
     fn now_ns(&self) -> u64 {
         self.now().0
     }

@@ -1,0 +1,215 @@
+//! A strike corrected by the miss of the one before.
+//!
+//! What the model leaves out lets the tip pass beside the target, and does so again in a throw
+//! that hardly differs. So the last throw is changed as little as possible, until the simulated
+//! tip passes as far on the other side: iterative learning control in which the simulator gives
+//! the slopes. With each throw the aim moves by the miss, so what persists is taken out.
+
+use super::planning::check;
+use super::setup::{Count, Setup};
+use super::{PlanError, PlanOptions, PlanRequest, Strike, ThrowGoal, start_pose_for};
+use arm_model::{JointTrajectory, JointVector, TrajectoryError};
+use nalgebra::Vector3;
+use shared_types::Plan;
+
+/// Longest miss that is taken for one of the same throw (m); beyond, the model does not hold.
+const MISS_MAX_M: f64 = 0.15;
+/// Rounds of polishing at most: a throw moves by centimetres, its slopes hold for less.
+const ROUNDS: usize = 4;
+
+/// Corrects the strike `last`, whose tip passed the target by `miss_m` (tip minus target at the
+/// closest approach, m, base frame). The rope is the one that `last` was planned for; the
+/// request's is not used. The plan is for the request's target, from where `last` aimed.
+///
+/// # Errors
+/// As [`plan`](super::plan); another task than a strike, a `last` with other waypoint times
+/// than the request's, a miss that is none of this throw.
+pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Result<Plan, PlanError> {
+    let ThrowGoal::Strike(strike) = &request.goal else {
+        let task = request.goal.kind().name();
+        let why = format!("only strikes are corrected by their miss, not a {task}: plan it anew");
+        return Err(PlanError::Again(why));
+    };
+    let miss_length_m = Vector3::from(miss_m).norm();
+    if miss_length_m.is_nan() || miss_length_m > MISS_MAX_M {
+        return Err(PlanError::Again(format!(
+            "a miss of {:.1} cm is too far to be corrected (at most {:.0} cm): identify the rope again",
+            100.0 * miss_length_m,
+            100.0 * MISS_MAX_M
+        )));
+    }
+    let aimed_m = Vector3::from(last.aim_m.unwrap_or(last.target_m));
+    let moved = Vector3::from(strike.target_m) - Vector3::from(last.target_m);
+    let aim = Strike {
+        target_m: (aimed_m + moved - Vector3::from(miss_m)).into(),
+        config: strike.config.clone(),
+    };
+    let stretched = stretched(last.trajectory.times_s(), &aim.config.waypoint_times_s);
+    let request = PlanRequest {
+        rope: last.rope,
+        options: PlanOptions {
+            segment_stretch_max: stretched,
+            ..request.options
+        },
+        ..request.clone()
+    };
+    check(&aim, &request)?;
+    let setup = Setup::new(&aim, &request)?;
+    let turned = start_pose_for(aim.target_m)[0] - start_pose_for(aimed_m.into())[0];
+    let throw = turned_by(&last.trajectory, turned)?;
+    let mut x = setup.space.encode(&throw).ok_or_else(|| {
+        PlanError::Again(
+            "the last throw moves other joints, or another number of waypoints, than the planner is configured for: give the same configuration, or plan anew".to_owned(),
+        )
+    })?;
+    let mut count = Count::default();
+    for _ in 0..ROUNDS {
+        let before = x.clone();
+        let polished = setup.polish(vec![x], &mut count)?;
+        x = polished.into_iter().next().unwrap_or_default();
+        if x == before {
+            break;
+        }
+    }
+    let trajectory = setup.space.decode(&x)?;
+    let chosen = setup.finalists(vec![(x, trajectory)], &mut count)?;
+    let chosen = chosen.into_iter().next();
+    let chosen = chosen.ok_or(PlanError::OnlyCollisions(count.simulations))?;
+    Ok(Plan {
+        target_m: strike.target_m,
+        aim_m: Some(aim.target_m),
+        unconfirmed: last.unconfirmed.clone(),
+        ..setup.finish(chosen, count)?
+    })
+}
+
+/// How much the segments of a throw differ from those configured, as a factor; 1 for the same.
+fn stretched(times_s: &[f64], configured_s: &[f64]) -> f64 {
+    let spans = |times: &[f64]| times.windows(2).map(|t| t[1] - t[0]).collect::<Vec<_>>();
+    let configured = spans(&[&[0.0], configured_s].concat());
+    let factors = spans(times_s).into_iter().zip(configured);
+    let factor = factors
+        .map(|(is, was)| (is / was).max(was / is))
+        .fold(1.0, f64::max);
+    if factor < 1.0 + 1e-9 { 1.0 } else { factor }
+}
+
+/// The same motion with joint 1 elsewhere by `angle_rad` all along.
+fn turned_by(
+    trajectory: &JointTrajectory,
+    angle_rad: f64,
+) -> Result<JointTrajectory, TrajectoryError> {
+    let turned = |q: &JointVector| {
+        let mut q = *q;
+        q[0] += angle_rad;
+        q
+    };
+    let knots: Vec<JointVector> = trajectory.waypoints().iter().map(turned).collect();
+    JointTrajectory::new(trajectory.times_s(), &knots)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PlannerConfig;
+    use crate::plan::{ThrowSimulator, plan, simulator_for};
+    use crate::ropes::random_rope;
+    use rope_sim::{Candidate, FrameTimes, PlannedArm, roll_out};
+    use shared_types::{RopeParams, Task};
+    use std::ops::ControlFlow;
+
+    fn request(task: Task, target_m: [f64; 3]) -> PlanRequest {
+        let goal = PlannerConfig::default().goal(task, target_m);
+        let options = PlanOptions {
+            population: 24,
+            generations: Some(12),
+            searches: 1,
+            ..PlanOptions::default()
+        };
+        PlanRequest::new(goal, &random_rope(11), options)
+    }
+
+    fn planned(request: &PlanRequest) -> Plan {
+        plan(request, &mut |_| ControlFlow::Continue(())).unwrap()
+    }
+
+    /// How far another rope's tip passes the target in a throw (m).
+    fn miss_m(request: &PlanRequest, rope: &RopeParams, thrown: &Plan) -> Vector3<f64> {
+        let task = request.goal.task();
+        let simulator = simulator_for(task, rope, &request.cell, &request.options);
+        let simulator: ThrowSimulator = simulator.exact();
+        let arm = PlannedArm::new(thrown.trajectory, request.cell.pole);
+        let options = simulator.options(thrown.trajectory.duration_s(), FrameTimes::NONE);
+        let rollouts = roll_out(&[Candidate::new(rope, &arm)], &options).unwrap();
+        let closest = rollouts[0].watched.to_point.unwrap();
+        Vector3::from(closest.tip_m) - Vector3::from(task.target_m())
+    }
+
+    #[test]
+    fn a_throw_with_times_of_its_own_keeps_them() {
+        let mut request = request(Task::Strike, [0.95, 0.25, 0.1]);
+        let plain = request.clone();
+        request.options.segment_stretch_max = 1.3;
+        let thrown = planned(&request);
+        let again = plan_again(&plain, &thrown, [0.01, 0.0, -0.005]).unwrap();
+        let pairs = again
+            .trajectory
+            .times_s()
+            .iter()
+            .zip(thrown.trajectory.times_s());
+        for (again_s, thrown_s) in pairs {
+            assert!((again_s - thrown_s).abs() < 1e-12);
+        }
+        assert!(again.predicted_error_m < 1e-3, "{again:?}");
+    }
+
+    /// A rope 8 mm longer and stiffer than the one planned for is struck at the third throw.
+    #[test]
+    fn what_persists_of_a_miss_is_taken_out() {
+        for target_m in [[0.95, 0.25, 0.1], [0.9, -0.3, 0.4]] {
+            let request = request(Task::Strike, target_m);
+            let truth = RopeParams {
+                length_m: request.rope.length_m + 0.008,
+                joint_stiffness_nm_per_rad: 1.3 * request.rope.joint_stiffness_nm_per_rad,
+                ..request.rope
+            };
+            let mut thrown = planned(&request);
+            let mut misses_m = Vec::new();
+            for _ in 0..3 {
+                let miss = miss_m(&request, &truth, &thrown);
+                misses_m.push(miss.norm());
+                thrown = plan_again(&request, &thrown, miss.into()).unwrap();
+                assert_eq!(thrown.target_m, target_m);
+                assert!(request.limits.worst_violation(&thrown.trajectory).is_none());
+                assert!(thrown.predicted_error_m < 1e-3, "{thrown:?}");
+            }
+            let [first, second, third] = misses_m[..] else {
+                panic!()
+            };
+            assert!(first > 4e-3, "{misses_m:?}");
+            assert!(second < 0.4 * first && third < 1.5e-3, "{misses_m:?}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_corrected_is_refused_with_the_reason() {
+        let strike = request(Task::Strike, [0.95, 0.25, 0.1]);
+        let thrown = planned(&strike);
+        let refused = |request: &PlanRequest, miss_m| {
+            let error = plan_again(request, &thrown, miss_m).unwrap_err();
+            assert!(error.is_input());
+            error.to_string()
+        };
+        assert!(refused(&strike, [0.2, 0.0, 0.0]).contains("20.0 cm is too far"));
+        assert!(refused(&strike, [f64::NAN, 0.0, 0.0]).contains("too far"));
+        let lob = request(Task::Lob, [0.95, 0.25, 0.1]);
+        assert!(refused(&lob, [0.01, 0.0, 0.0]).contains("only strikes"));
+        let (start, end) = (thrown.trajectory.start(), thrown.trajectory.end());
+        let other = Plan {
+            trajectory: JointTrajectory::new(&[0.0, 1.0], &[start, end]).unwrap(),
+            ..thrown.clone()
+        };
+        let error = plan_again(&strike, &other, [0.01, 0.0, 0.0]).unwrap_err();
+        assert!(error.to_string().contains("number of waypoints"), "{error}");
+    }
+}
