@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 /// Fraction of some trials flagged as out of distribution.
 fn flagged(trials: &[Trial]) -> f64 {
-    mean(trials.iter().map(|t| f64::from(u8::from(t.outside))))
+    mean(trials.iter().map(|t| f64::from(u8::from(t.flagged))))
 }
 
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {

@@ -62,8 +62,8 @@ pub struct Trial {
     /// Out-of-distribution score.
     #[serde(alias = "novelty")]
     pub out_of_distribution: f64,
-    /// Whether the rope was taken for one outside the ranges.
-    pub outside: bool,
+    /// Whether the rope was flagged as out of distribution.
+    pub flagged: bool,
     /// Method as the estimate names it.
     pub method: String,
     /// Ropes simulated.
@@ -181,7 +181,7 @@ pub fn run(
             interval_90: found.posterior.interval_90,
             residual_px: found.residual_px,
             out_of_distribution: found.out_of_distribution.score,
-            outside: found.out_of_distribution.is_flagged(),
+            flagged: found.out_of_distribution.is_flagged(),
             method: found.method.to_string(),
             simulations: found.simulations,
         })

@@ -112,7 +112,7 @@ pub fn summarise(trials: &[Trial]) -> SysidSummary {
             ratio("damping c / stiffness k", |v| v[2] / v[3]),
             ratio("lead mass / mass per length", |v| v[6] / v[5]),
         ],
-        flagged_fraction: mean(trials.iter().map(|t| f64::from(u8::from(t.outside)))),
+        flagged_fraction: mean(trials.iter().map(|t| f64::from(u8::from(t.flagged)))),
         residual_px: quantile(trials.iter().map(|t| t.residual_px), 0.5),
         simulations: mean(trials.iter().map(|t| f64::from(t.simulations))),
     }
@@ -132,7 +132,7 @@ mod tests {
             interval_90: truth.map(|v| [v * low, v * 1.2]),
             residual_px: 1.0,
             out_of_distribution: 0.0,
-            outside: low > 1.0,
+            flagged: low > 1.0,
             method: "hybrid-search".to_owned(),
             simulations: 10,
         };

@@ -5,6 +5,7 @@
 //! tip passes as far on the other side: iterative learning control in which the simulator gives
 //! the slopes. With each throw the aim moves by the miss, so what persists is taken out.
 
+use super::config::STRETCH_MAX;
 use super::planning::check;
 use super::setup::{Count, Setup};
 use super::{PlanError, PlanOptions, PlanRequest, Strike, ThrowGoal, start_pose_for};
@@ -44,7 +45,13 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
         target_m: (aimed_m + moved - Vector3::from(miss_m)).into(),
         config: strike.config.clone(),
     };
-    let stretched = stretched(last.trajectory.times_s(), &aim.config.waypoint_times_s);
+    let other = || {
+        PlanError::Again(
+            "the last throw moves other joints, or by other waypoints and times, than the planner is configured for: give the same configuration, or plan anew".to_owned(),
+        )
+    };
+    let times_s = last.trajectory.times_s();
+    let stretched = stretched(times_s, &aim.config.waypoint_times_s).ok_or_else(other)?;
     let request = PlanRequest {
         rope: last.rope,
         options: PlanOptions {
@@ -57,11 +64,7 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
     let setup = Setup::new(&aim, &request)?;
     let turned = start_pose_for(aim.target_m)[0] - start_pose_for(aimed_m.into())[0];
     let throw = turned_by(&last.trajectory, turned)?;
-    let mut x = setup.space.encode(&throw).ok_or_else(|| {
-        PlanError::Again(
-            "the last throw moves other joints, or another number of waypoints, than the planner is configured for: give the same configuration, or plan anew".to_owned(),
-        )
-    })?;
+    let mut x = setup.space.encode(&throw).ok_or_else(other)?;
     let mut count = Count::default();
     for _ in 0..ROUNDS {
         let before = x.clone();
@@ -83,15 +86,18 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
     })
 }
 
-/// How much the segments of a throw differ from those configured, as a factor; 1 for the same.
-fn stretched(times_s: &[f64], configured_s: &[f64]) -> f64 {
+/// How much the segments of a throw differ from those configured, as a factor; 1 for the same,
+/// none for as many others, or where it is more than a search allows.
+fn stretched(times_s: &[f64], configured_s: &[f64]) -> Option<f64> {
     let spans = |times: &[f64]| times.windows(2).map(|t| t[1] - t[0]).collect::<Vec<_>>();
-    let configured = spans(&[&[0.0], configured_s].concat());
-    let factors = spans(times_s).into_iter().zip(configured);
-    let factor = factors
-        .map(|(is, was)| (is / was).max(was / is))
-        .fold(1.0, f64::max);
-    if factor < 1.0 + 1e-9 { 1.0 } else { factor }
+    let (is, was) = (spans(times_s), spans(&[&[0.0], configured_s].concat()));
+    let factors = is
+        .iter()
+        .zip(&was)
+        .map(|(is, was)| (is / was).max(was / is));
+    let factor = factors.fold(1.0, f64::max);
+    let factor = if factor < 1.0 + 1e-9 { 1.0 } else { factor };
+    (is.len() == was.len() && factor <= STRETCH_MAX).then_some(factor)
 }
 
 /// The same motion with joint 1 elsewhere by `angle_rad` all along.
@@ -210,6 +216,6 @@ mod tests {
             ..thrown.clone()
         };
         let error = plan_again(&strike, &other, [0.01, 0.0, 0.0]).unwrap_err();
-        assert!(error.to_string().contains("number of waypoints"), "{error}");
+        assert!(error.to_string().contains("other waypoints"), "{error}");
     }
 }

@@ -255,6 +255,9 @@ impl Default for PlanOptions {
     }
 }
 
+/// Most by which a segment of a throw may be stretched or shrunk (1).
+pub(super) const STRETCH_MAX: f64 = 2.0;
+
 impl PlanOptions {
     /// Refuses what cannot be searched with, or never ends.
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
@@ -266,7 +269,7 @@ impl PlanOptions {
         let range = f64::MIN_POSITIVE..=5e-3;
         within(range, "above 0 and at most 0.005 s", &steps_s)?;
         let stretch = [("segment_stretch_max", self.segment_stretch_max)];
-        within(1.0..=2.0, "from 1 to 2", &stretch)?;
+        within(1.0..=STRETCH_MAX, "from 1 to 2", &stretch)?;
         let population = [("population", self.population as f64)];
         within(4.0..=COUNT_MAX, "from 4 to 10000", &population)?;
         let generations = self.generations.map_or(1.0, |count| count as f64);

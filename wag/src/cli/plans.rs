@@ -42,8 +42,8 @@ pub struct PlanArgs {
     /// 5 cm, or the task to fail.
     #[arg(long)]
     pub allow_miss: bool,
-    /// Plan for this many ropes drawn from the posterior of identification, and forecast
-    /// the error; 0 plans for the most likely rope alone.
+    /// Plan for this many ropes drawn from the posterior of identification; 0 plans for the
+    /// most likely rope alone.
     #[arg(long, default_value_t = 0, value_name = "K")]
     pub robust: usize,
     /// The arm's response as written by `wag latency` (TOML): the throw is planned for an

@@ -52,7 +52,8 @@ fn list(args: &LedgerArgs) -> Outcome<Option<Value>> {
                 println!("{}: {problem}", entry.run.display());
             }
         }
-        println!("{} runs", entries.len());
+        let s = if entries.len() == 1 { "" } else { "s" };
+        println!("{} run{s}", entries.len());
     }
     Ok(Some(
         json!({ "ok": true, "command": "ledger", "runs": entries, "csv": args.csv }),

@@ -3,7 +3,7 @@
 use crate::cli::ExportCommand;
 use crate::config;
 use anyhow::Context;
-use cli_output::{OrInput, Outcome, output};
+use cli_output::{OrInput, Outcome, is_interrupted, output};
 use rt_controller::recording::{CORE_VERSION, Gap, Replay};
 use run_log::{CYCLES_TABLE, Run, files};
 use serde_json::{Value, json};
@@ -104,7 +104,8 @@ pub fn explain(path: &Path) -> Outcome<Option<Value>> {
 /// Keeps the explanation of a run that was stopped and shows it to people.
 pub fn explain_stop(run: &Path) {
     let cause = Run::open(run).ok().and_then(|run| run.keep_cause());
-    if let Some(found) = cause.filter(|found| found.stopped) {
+    // Who interrupted it knows why.
+    if let Some(found) = cause.filter(|found| found.stopped && !is_interrupted()) {
         output::remark(format_args!("{}", run_log::show(&found).trim_end()));
     }
 }

@@ -13,8 +13,10 @@ use std::process::{Command, Stdio};
 /// Names the Python that has MuJoCo.
 pub(super) const PYTHON: &str = "WAG_MUJOCO_PYTHON";
 const SCRIPT: &str = include_str!("../../../other_reality/rope.py");
-/// Step of the simulation, and time between two poses of the attach frame (s).
-const STEP_S: f64 = 5e-4;
+/// Steps of the simulation, and times between two poses of the attach frame (s): the first at
+/// which it does not blow up, as it may where a chain whips.
+const STEPS_S: [f64; 3] = [5e-4, 2.5e-4, 1.25e-4];
+const BLEW_UP: &str = "blew up";
 
 /// A rope in MuJoCo.
 #[derive(Debug, Clone, Copy)]
@@ -69,9 +71,28 @@ impl Mujoco {
         times: &FrameTimes,
         nodes: usize,
     ) -> anyhow::Result<Vec<Vector3<f64>>> {
+        let mut found = Err(anyhow!("no step"));
+        for step_s in STEPS_S {
+            found = self.simulate_in(rope, &motion, seed, times, nodes, step_s);
+            if !matches!(&found, Err(why) if why.to_string().contains(BLEW_UP)) {
+                break;
+            }
+        }
+        found
+    }
+
+    fn simulate_in(
+        &self,
+        rope: &OtherRope,
+        motion: impl Fn(f64) -> FrameMotion,
+        seed: u64,
+        times: &FrameTimes,
+        nodes: usize,
+        step_s: f64,
+    ) -> anyhow::Result<Vec<Vector3<f64>>> {
         let times_s: Vec<f64> = (0..times.count).map(|i| times.time_s(i)).collect();
         let last_s = times_s.last().context("no time is asked for")?;
-        let steps = (last_s / STEP_S).ceil() as usize;
+        let steps = (last_s / step_s).ceil() as usize;
         let request = Request {
             rope: &rope.params,
             refinement: rope.refinement,
@@ -81,9 +102,9 @@ impl Mujoco {
                 "rate_rad_s": rope.sway.rate_rad_s,
             }),
             seed,
-            pose_period_s: STEP_S,
+            pose_period_s: step_s,
             poses: (0..=steps)
-                .map(|i| pose(&motion(i as f64 * STEP_S)))
+                .map(|i| pose(&motion(i as f64 * step_s)))
                 .collect(),
             nodes,
             times_s,

@@ -25,13 +25,20 @@ pub(super) struct Row {
     /// Medians.
     residual_px: f64,
     out_of_distribution: f64,
-    /// Fraction of the ropes that were taken for ropes outside the ranges.
-    outside: f64,
+    /// Fraction of the ropes that were flagged as out of distribution.
+    flagged: f64,
     /// Fraction of the misses within their forecasts' 90 % intervals.
     covered: f64,
     /// Median of those intervals' upper ends (m).
     forecast_high_m: f64,
+    /// Throws that missed by more than [`FAR_M`], and the others: how many, and how many of them
+    /// were warned of.
+    far: [usize; 2],
+    near: [usize; 2],
 }
+
+/// A miss that should have been warned of (m).
+const FAR_M: f64 = 0.015;
 
 /// Not a number for none.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
@@ -42,7 +49,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     experiments::trials::mean(values)
 }
 
-pub(super) const TABLE: [Column<Row>; 12] = [
+pub(super) const TABLE: [Column<Row>; 13] = [
     ("miss (cm)", |row| row.name.clone()),
     ("ropes", |row| row.ropes.to_string()),
     ("refused", |row| row.refused.to_string()),
@@ -58,12 +65,16 @@ pub(super) const TABLE: [Column<Row>; 12] = [
     ("out of distribution, score", |row| {
         number(row.out_of_distribution, 2)
     }),
-    ("flagged as outside (%)", |row| {
-        number(100.0 * row.outside, 0)
+    ("out of distribution (%)", |row| {
+        number(100.0 * row.flagged, 0)
     }),
     ("within its 90 % interval (%), up to (cm)", |row| {
         let held = number(100.0 * row.covered, 0);
         format!("{held}, {}", cm(row.forecast_high_m))
+    }),
+    ("warned of misses over 1.5 cm, of others", |row| {
+        let ([far, far_warned], [near, near_warned]) = (row.far, row.near);
+        format!("{far_warned} of {far}, {near_warned} of {near}")
     }),
 ];
 
@@ -76,6 +87,10 @@ pub(super) fn row(name: &str, fates: &[&Fate]) -> (Row, Curve) {
     let forecasts = || thrown().filter_map(|t| Some((t.miss_m, t.forecast?.interval_90_m)));
     let one = |is: bool| f64::from(u8::from(is));
     let covered = |(miss_m, [low, high]): (f64, [f64; 2])| one((low..=high).contains(&miss_m));
+    let warned = |is_far: bool| {
+        let of = || thrown().filter(|t| (t.miss_m > FAR_M) == is_far);
+        [of().count(), of().filter(|t| t.warned).count()]
+    };
     let mut refusals: Vec<String> = fates
         .iter()
         .filter_map(|fate| match fate {
@@ -99,9 +114,11 @@ pub(super) fn row(name: &str, fates: &[&Fate]) -> (Row, Curve) {
         length_error_max_m: quantile(lengths_m(), 1.0),
         residual_px: quantile(fits().map(|f| f.residual_px), 0.5),
         out_of_distribution: quantile(fits().map(|f| f.out_of_distribution), 0.5),
-        outside: mean(fits().map(|f| one(f.outside))),
+        flagged: mean(fits().map(|f| one(f.flagged))),
         covered: mean(forecasts().map(covered)),
         forecast_high_m: quantile(forecasts().map(|(_, [_, high])| high), 0.5),
+        far: warned(true),
+        near: warned(false),
     };
     (row, Curve::cm(name, misses_m(), None))
 }

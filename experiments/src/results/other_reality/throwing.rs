@@ -8,7 +8,9 @@ use arm_model::{Cell, JointTrajectory};
 use experiments::trials::{KEYPOINTS, alone};
 use nalgebra::Vector3;
 use planner::identify::IdentifyOptions;
-use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, plan_again, simulator_for};
+use planner::plan::{
+    PlanOptions, PlanRequest, PosteriorEnsemble, plan_again, simulator_for, warnings,
+};
 use planner::synthetic::{FilmTiming, RopeFilm, SyntheticFilm, project};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -50,6 +52,8 @@ pub(super) struct Thrown {
     /// How the film was fitted; none for a rope that was not identified.
     pub fit: Option<Fit>,
     pub forecast: Option<ErrorForecast>,
+    /// Whether the plan was pointed out as poor or uncertain.
+    pub warned: bool,
 }
 
 /// How a film was fitted.
@@ -57,8 +61,8 @@ pub(super) struct Thrown {
 pub(super) struct Fit {
     pub residual_px: f64,
     pub out_of_distribution: f64,
-    /// Whether the rope was taken for one outside the ranges.
-    pub outside: bool,
+    /// Whether the rope was flagged as out of distribution.
+    pub flagged: bool,
 }
 
 impl Fate {
@@ -104,7 +108,7 @@ impl Reality<'_> {
         let fit = Fit {
             residual_px: found.residual_px,
             out_of_distribution: found.out_of_distribution.score,
-            outside: found.out_of_distribution.is_flagged(),
+            flagged: found.out_of_distribution.is_flagged(),
         };
         self.thrown(index, case, (rope, ensemble), Some(fit))
     }
@@ -145,6 +149,7 @@ impl Reality<'_> {
                 length_error_m: rope.length_m - case.rope.params.length_m,
                 fit,
                 forecast: plan.forecast,
+                warned: !warnings(&plan).is_empty(),
             }));
             let mut error_m = || SCORE_ERROR_M * rng.sample::<f64, _>(StandardNormal);
             let measured = miss + Vector3::from_fn(|_, _| error_m());

@@ -138,36 +138,44 @@ pub(super) fn measure(args: &LatencyArgs) -> Outcome<Value> {
     let arm = SocketAddr::new(address.ip, address.command);
     let work = |session: &mut Session, link: &ArmLink| {
         let mut stops = Vec::new();
-        for (mode, swing) in &swings {
-            for method in [StopMethod::Brake, StopMethod::State4] {
-                if !stops.is_empty() {
-                    // Who looked at the arm acknowledges the stop.
-                    is_asked
-                        .then(|| session.confirm(STOPPED, "MOVE"))
+        let mut measure_all = || -> anyhow::Result<()> {
+            for (mode, swing) in &swings {
+                for method in [StopMethod::Brake, StopMethod::State4] {
+                    if !stops.is_empty() {
+                        // Who looked at the arm acknowledges the stop.
+                        is_asked
+                            .then(|| session.confirm(STOPPED, "MOVE"))
+                            .transpose()?;
+                        pipeline::enable(session, link, true, &mut BringUp::default())?;
+                        pipeline::arm_for(session, link, SetUp, None)?;
+                        pipeline::move_to(session, link, START_POSE, MOVE_SPEED)?;
+                    }
+                    let word = is_asked
+                        .then(|| session.confirm(AT_START, "MEASURE"))
                         .transpose()?;
-                    pipeline::enable(session, link, true, &mut BringUp::default())?;
-                    pipeline::arm_for(session, link, SetUp, None)?;
-                    pipeline::move_to(session, link, START_POSE, MOVE_SPEED)?;
+                    session.await_hold()?;
+                    let stage = Stage::begin("stop");
+                    pipeline::arm_for(session, link, *mode, Some(word.unwrap_or_else(now_ns)))?;
+                    let stopped = stop(session, link, arm, &pole, swing, (*mode, method))?;
+                    stage.done(&format!(
+                        "{:?}, by the {}: {:.2} m/s to rest in {:.0} ms and {:.0} mm",
+                        mode,
+                        stopped.by,
+                        stopped.speed_m_s,
+                        1e3 * stopped.time_s,
+                        1e3 * stopped.distance_m
+                    ));
+                    stops.push(stopped);
                 }
-                let word = is_asked
-                    .then(|| session.confirm(AT_START, "MEASURE"))
-                    .transpose()?;
-                session.await_hold()?;
-                let stage = Stage::begin("stop");
-                pipeline::arm_for(session, link, *mode, Some(word.unwrap_or_else(now_ns)))?;
-                let stopped = stop(session, link, arm, &pole, swing, (*mode, method))?;
-                stage.done(&format!(
-                    "{:?}, by the {}: {:.2} m/s to rest in {:.0} ms and {:.0} mm",
-                    mode,
-                    stopped.by,
-                    stopped.speed_m_s,
-                    1e3 * stopped.time_s,
-                    1e3 * stopped.distance_m
-                ));
-                stops.push(stopped);
             }
+            Ok(())
+        };
+        let measured = measure_all();
+        // What was measured before a failure is worth knowing.
+        if !stops.is_empty() {
+            show(&stops);
         }
-        show(&stops);
+        measured?;
         Ok(json!({ "command": "latency", "stops": stops }))
     };
     let place = (args.out.as_deref(), "stops");
