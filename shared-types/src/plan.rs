@@ -85,6 +85,16 @@ pub struct ErrorForecast {
     pub interval_90_m: [f64; 2],
 }
 
+/// Where a corrected throw aims.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Aim {
+    /// The place in the world (m).
+    pub point_m: [f64; 3],
+    /// How many misses have moved it.
+    pub corrections: u32,
+}
+
 /// A planned throw. JSON form: `plan.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -97,9 +107,9 @@ pub struct Plan {
     pub task: Task,
     /// Target in the world (m).
     pub target_m: [f64; 3],
-    /// Where the simulated tip passes instead (m), of a throw corrected by an earlier miss.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub aim_m: Option<[f64; 3]>,
+    /// Where the simulated tip passes instead, of a throw corrected by the misses before.
+    #[serde(default)]
+    pub aim: Option<Aim>,
     /// Rope the throw was planned for.
     pub rope: RopeParams,
     /// Cell it was planned for; plans of older versions do not tell it.

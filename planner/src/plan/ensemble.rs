@@ -32,7 +32,7 @@ pub struct PosteriorEnsemble {
 /// not explain of the one, it does not foresee of the other; a throw is faster, and is
 /// seen from no camera that the fit could move. Tuned in another reality (`experiments
 /// full-pipeline`, odd seeds).
-const DISCREPANCY_PER_RESIDUAL: f64 = 2.5;
+const DISCREPANCY_PER_RESIDUAL: f64 = 3.0;
 
 impl PosteriorEnsemble {
     /// Ropes that a forecast is made with.

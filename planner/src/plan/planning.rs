@@ -89,7 +89,7 @@ impl Setup<'_> {
             seed: request.options.seed,
             task: request.goal.kind(),
             target_m: self.task.target_m(),
-            aim_m: None,
+            aim: None,
             rope: *rope,
             cell: Some(request.cell),
             predicted_error_m: self.task.error_m(&outcome),

@@ -95,6 +95,20 @@ pub fn describe(plan: &Plan) -> String {
     )
 }
 
+/// Warnings and forecast.
+pub fn tell(plan: &Plan) {
+    for warning in warnings(plan) {
+        output::remark(format_args!("warning: {warning}"));
+    }
+    if let Some(f) = plan.forecast {
+        let [low, high] = f.interval_90_m.map(|m| 100.0 * m);
+        let median = 100.0 * f.median_m;
+        println!(
+            "forecast: error {median:.2} cm in the median, {low:.2} to {high:.2} cm in nine of ten"
+        );
+    }
+}
+
 pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     let unconfirmed = files::read_unconfirmed(&args.rope).or_input()?;
@@ -134,18 +148,7 @@ pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
     if let Some(path) = &args.csv {
         files::write_trajectory(path, &plan.trajectory, limits.period_s()).or_failed()?;
     }
-    for warning in &warnings {
-        output::remark(format_args!("warning: {warning}"));
-    }
-    if let Some(f) = plan.forecast {
-        println!(
-            "over {} ropes it might be: error {:.2} cm in the median, {:.2} to {:.2} cm in nine of ten",
-            f.ropes,
-            100.0 * f.median_m,
-            100.0 * f.interval_90_m[0],
-            100.0 * f.interval_90_m[1]
-        );
-    }
+    tell(&plan);
     println!("plan written to `{}`", args.out.display());
     Ok(Some(json!({
         "ok": true, "command": format!("plan {}", kind.name()), "out": args.out, "seed": args.seed,

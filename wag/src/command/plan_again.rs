@@ -1,11 +1,11 @@
 //! `wag plan again`: the last strike, corrected by its miss.
 
-use super::plan::{classify, describe};
+use super::plan::{classify, describe, tell};
 use crate::cli::AgainArgs;
 use crate::config;
 use anyhow::Context;
 use arm_model::Limits;
-use cli_output::{OrInput, Outcome, Stage, output};
+use cli_output::{OrInput, Outcome, Stage};
 use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, plan_again, warnings};
@@ -58,14 +58,12 @@ pub fn run(args: &AgainArgs) -> Outcome<Option<Value>> {
     let stage = Stage::begin("plan");
     let plan = plan_again(&request, &last, miss_m).map_err(classify)?;
     stage.done(&describe(&plan));
-    for warning in warnings(&plan) {
-        output::remark(format_args!("warning: {warning}"));
-    }
+    tell(&plan);
     files::write_json(&args.out, &plan).or_failed()?;
     println!("corrected plan written to `{}`", args.out.display());
     Ok(Some(json!({
         "ok": true, "command": "plan again", "out": args.out, "miss_m": miss_m,
-        "target_m": plan.target_m, "aim_m": plan.aim_m, "warnings": warnings(&plan),
+        "target_m": plan.target_m, "aim": plan.aim, "warnings": warnings(&plan), "forecast": plan.forecast,
         "predicted_error_m": plan.predicted_error_m, "simulations": plan.simulations,
         "trajectory_sha256": plan.trajectory_sha256,
     })))

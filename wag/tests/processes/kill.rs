@@ -94,7 +94,7 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
     let miss_m = (0..3).map(square).sum::<f64>().sqrt();
     assert!((miss_m - score["closest_m"].as_f64().unwrap()).abs() < 1e-9);
     for axis in 0..3 {
-        let aside_m = at(&again["target_m"], axis) - at(&again["aim_m"], axis);
+        let aside_m = at(&again["target_m"], axis) - at(&again["aim"]["point_m"], axis);
         assert!(
             (aside_m - at(&again["miss_m"], axis)).abs() < 1e-12,
             "{again}"

@@ -9,7 +9,7 @@ use experiments::trials::{KEYPOINTS, alone};
 use nalgebra::Vector3;
 use planner::identify::IdentifyOptions;
 use planner::plan::{
-    PlanOptions, PlanRequest, PosteriorEnsemble, plan_again, simulator_for, warnings,
+    MISS_STD_M, PlanOptions, PlanRequest, PosteriorEnsemble, plan_again, simulator_for, warnings,
 };
 use planner::synthetic::{FilmTiming, RopeFilm, SyntheticFilm, project};
 use rand::{RngExt, SeedableRng};
@@ -25,10 +25,6 @@ use std::ops::ControlFlow;
 const FILM_PERIOD_S: f64 = 1.0 / 240.0;
 /// Time between positions of the tip in a throw (s); it moves straight in between.
 const THROW_PERIOD_S: f64 = 1e-3;
-
-/// Standard deviation of a miss as the stereo camera measures it, each axis (m): the rendered
-/// throws' (`hil-tests/tests/score_rendered.rs`) are within 6 mm in 95 of 100.
-const SCORE_ERROR_M: f64 = 2e-3;
 
 /// What became of a rope.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -151,7 +147,7 @@ impl Reality<'_> {
                 forecast: plan.forecast,
                 warned: !warnings(&plan).is_empty(),
             }));
-            let mut error_m = || SCORE_ERROR_M * rng.sample::<f64, _>(StandardNormal);
+            let mut error_m = || MISS_STD_M * rng.sample::<f64, _>(StandardNormal);
             let measured = miss + Vector3::from_fn(|_, _| error_m());
             planned = plan_again(&request, &plan, measured.into()).context("planning again");
         }
