@@ -20,11 +20,13 @@ pub struct Shortcoming {
     pub is_severe: bool,
 }
 
-/// What is wrong with a plan: a strike that misses, another task that fails.
+/// What is wrong with a plan: a strike that misses, or is as likely to as not for what is known
+/// of the rope; another task that fails.
 #[must_use]
 pub fn shortcoming(plan: &Plan) -> Option<Shortcoming> {
     if plan.task == Task::Strike {
-        return miss(plan.predicted_error_m);
+        let guess = plan.forecast.and_then(|f| guess(f.median_m));
+        return guess.or_else(|| miss(plan.predicted_error_m));
     }
     let unmet = plan.verdict.conditions.iter().filter(|c| !c.met);
     let unmet: Vec<&str> = unmet.map(|c| c.name.as_str()).collect();
@@ -33,6 +35,16 @@ pub fn shortcoming(plan: &Plan) -> Option<Shortcoming> {
             "the {} is predicted to fail (not met: {}); try another --seed or target",
             plan.task.name(),
             unmet.join(", ")
+        ),
+        is_severe: true,
+    })
+}
+
+fn guess(median_m: f64) -> Option<Shortcoming> {
+    (median_m > MISS_MAX_M).then(|| Shortcoming {
+        message: format!(
+            "the model explains this rope's film so badly that the throw would be a guess (forecast {:.0} cm in the median): film and identify it again, or throw it all the same and correct it by its miss (`wag plan again`)",
+            100.0 * median_m
         ),
         is_severe: true,
     })
@@ -85,5 +97,8 @@ mod tests {
         let small = miss(0.03).unwrap();
         assert!(small.message.contains("3.0 cm") && !small.is_severe);
         assert!(miss(0.06).unwrap().is_severe);
+        assert_eq!(guess(0.04), None);
+        let guess = guess(0.2).unwrap();
+        assert!(guess.message.contains("20 cm") && guess.is_severe);
     }
 }
