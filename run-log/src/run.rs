@@ -127,6 +127,28 @@ impl Run {
         self.file(files::SUMMARY, files::read_json)
     }
 
+    /// Where the tip passed minus the target (m, base frame), as the run's camera measured it.
+    /// One that it hardly knows is refused.
+    pub fn miss_m(&self) -> Result<[f64; 3]> {
+        /// Widest interval of a distance whose miss is believed (m).
+        const INTERVAL_MAX_M: f64 = 0.1;
+        let score = self.summary()?.unwrap_or_default()["score"].take();
+        let path = self.folder.join(files::SUMMARY);
+        let name = path.display();
+        let miss_m = serde_json::from_value(score["miss_m"].clone());
+        let miss_m = miss_m.with_context(|| {
+            format!("`{name}` has no miss by the camera (`score.miss_m`): name it with --miss")
+        })?;
+        let [low_m, high_m]: [f64; 2] = serde_json::from_value(score["interval_m"].clone())
+            .with_context(|| format!("`{name}`: `score.interval_m`"))?;
+        ensure!(
+            high_m - low_m < INTERVAL_MAX_M,
+            "`{name}`: the camera knows the distance from {low_m:.3} to {high_m:.3} m only \
+             (`score.interval_m`); look at throw.png and name the miss with --miss"
+        );
+        Ok(miss_m)
+    }
+
     /// The cell it ran in; runs of older versions do not tell it.
     pub fn cell(&self) -> Result<Option<Cell>> {
         self.file(files::CELL, files::read_cell)

@@ -41,7 +41,7 @@ pub struct Score {
 }
 
 /// Detections of the tip needed.
-const MIN_SIGHTINGS: usize = 6;
+const MIN_DETECTIONS: usize = 6;
 /// Chroma below which a colour counts as grey.
 const MIN_CHROMA: f64 = 25.0;
 /// Times looked at between two frames.
@@ -58,9 +58,9 @@ pub fn score(
     target_rgb: [u8; 3],
 ) -> Result<Score, ScoreError> {
     let frames = source.len();
-    if frames < MIN_SIGHTINGS {
+    if frames < MIN_DETECTIONS {
         return Err(ScoreError::Input(format!(
-            "the video has {frames} frames, at least {MIN_SIGHTINGS} are needed"
+            "the video has {frames} frames, at least {MIN_DETECTIONS} are needed"
         )));
     }
     check_colour("tip", tip_rgb)?;
@@ -82,11 +82,11 @@ pub fn score(
             detections.push(tip);
         }
     }
-    if detections.len() < MIN_SIGHTINGS {
+    if detections.len() < MIN_DETECTIONS {
         return Err(ScoreError::NotSeen {
             what: "tip",
             seen: detections.len(),
-            least: MIN_SIGHTINGS,
+            least: MIN_DETECTIONS,
         });
     }
     mark_small(&mut detections);

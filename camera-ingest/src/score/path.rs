@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn cut_sightings_are_bridged_and_make_the_path_less_sure() {
+    fn cut_detections_are_bridged_and_make_the_path_less_sure() {
         let clear = clear(|t| ([0.1 + 2.0 * t + 3.0 * t * t, 0.2], 0.6));
         let mut half = clear.clone();
         for detection in &mut half[6..9] {

@@ -60,7 +60,7 @@ pub struct SysidSummary {
     pub parameters: Vec<ParameterRow>,
     /// Rows of ratios.
     pub ratios: Vec<RatioRow>,
-    /// Fraction of the ropes, all of the ranges, that were taken for ropes outside.
+    /// Fraction of the ropes, all of the ranges, that were flagged as out of distribution.
     pub flagged_fraction: f64,
     /// Median distance of the fit to the keypoints (px).
     pub residual_px: f64,

@@ -17,7 +17,7 @@ use shared_types::RopeParams;
 pub(super) const INVISIBLE_PX: f64 = 1e4;
 /// Deviation of one detection against which the camera's prior is weighed (px): large,
 /// because neighbouring detections err together.
-const SIGHTING_PX: f64 = 20.0;
+const DETECTION_PX: f64 = 20.0;
 /// Step of the camera's corrections (m, rad).
 const STEP: f64 = 1e-4;
 /// Distance beyond which a detection counts as an outlier (Huber, px).
@@ -49,7 +49,7 @@ impl<'a> Comparer<'a> {
         let depth_m = film.observation.camera.to_left(&attach).z.max(0.1);
         let camera = film.observation.camera;
         let mut normal = SMatrix::<f64, CORRECTIONS, CORRECTIONS>::from_fn(|i, j| {
-            let weight = (SIGHTING_PX / coordinates.prior_std[CAMERA + i]).powi(2);
+            let weight = (DETECTION_PX / coordinates.prior_std[CAMERA + i]).powi(2);
             if i == j { weight } else { 0.0 }
         });
         let mut detections = Vec::new();

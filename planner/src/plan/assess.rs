@@ -43,7 +43,7 @@ pub fn shortcoming(plan: &Plan) -> Option<Shortcoming> {
 fn guess(median_m: f64) -> Option<Shortcoming> {
     (median_m > MISS_MAX_M).then(|| Shortcoming {
         message: format!(
-            "the model explains this rope's film so badly that the throw would be a guess (forecast {:.0} cm in the median): film and identify it again, or throw it all the same and correct it by its miss (`wag plan again`)",
+            "the throw would be a guess (forecast {:.0} cm in the median): the film leaves open, or the model does not explain, how this rope moves; film and identify it again, or throw it all the same and correct it by its miss (`wag plan again`)",
             100.0 * median_m
         ),
         is_severe: true,
@@ -77,10 +77,17 @@ pub fn warnings(plan: &Plan) -> Vec<String> {
         .forecast
         .filter(|f| f.interval_90_m[1] > FORECAST_WARN_M);
     let wide = wide.map(|f| {
-        format!(
-            "the tip may miss by up to {:.1} cm (95 %): the film leaves open, or the model does not explain, how this rope moves; weigh the tip (--lead-mass), measure the length (--length), film a gentler wiggle, or correct the first throw by its miss (`wag plan again`)",
-            100.0 * f.interval_90_m[1]
-        )
+        let cause = match (plan.aim, plan.task) {
+            (Some(_), _) => "so much may be left of the last miss; correct it once more",
+            (None, Task::Strike) => {
+                "the film leaves open, or the model does not explain, how this rope moves; identify it with its tip weighed (`wag identify --lead-mass`), its length measured (`--length`) or a gentler wiggle, or correct the throw by its miss (`wag plan again`)"
+            }
+            (None, Task::Lob | Task::Drape) => {
+                "the film leaves open, or the model does not explain, how this rope moves; identify it with its tip weighed (`wag identify --lead-mass`), its length measured (`--length`) or a gentler wiggle"
+            }
+        };
+        let high_cm = 100.0 * f.interval_90_m[1];
+        format!("the forecast reaches up to {high_cm:.1} cm: {cause}")
     });
     let failed = failed.into_iter().chain(wide);
     let first = poor.into_iter().chain(interrupted).chain(failed);

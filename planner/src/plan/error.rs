@@ -16,7 +16,7 @@ pub enum PlanError {
     Target(String),
     /// No throw of this rope can bring its tip to the target.
     #[error(
-        "target ({:.2}, {:.2}, {:.2}) m is out of reach: {reason}; these bounds allow ({:.2}, {:.2}, {:.2}) m, and `--reach FILE.svg` draws what throws reach",
+        "target ({:.2}, {:.2}, {:.2}) m is out of reach: {reason}; these bounds allow ({:.2}, {:.2}, {:.2}) m",
         target_m[0], target_m[1], target_m[2], nearest_m[0], nearest_m[1], nearest_m[2]
     )]
     Unreachable {

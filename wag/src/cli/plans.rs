@@ -38,8 +38,8 @@ pub struct PlanArgs {
     /// Also the joints as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
     #[arg(long)]
     pub csv: Option<PathBuf>,
-    /// Write the plan even if the tip is predicted to miss the target by more than
-    /// 5 cm, or the task to fail.
+    /// Write the plan even if the tip is predicted, or forecast in the median, to miss the
+    /// target by more than 5 cm, or the task to fail.
     #[arg(long)]
     pub allow_miss: bool,
     /// Plan for this many ropes drawn from the posterior of identification; 0 plans for the
@@ -73,6 +73,9 @@ pub struct AgainArgs {
     /// The arm's response that the plan was made with (TOML).
     #[arg(long, value_name = "FILE")]
     pub arm_response: Option<PathBuf>,
+    /// Write the plan even if it is predicted to pass its aim by more than 5 cm.
+    #[arg(long)]
+    pub allow_miss: bool,
     /// The corrected plan (JSON).
     #[arg(long)]
     pub out: PathBuf,

@@ -23,17 +23,17 @@ pub fn classify(error: PlanError) -> Failure {
 }
 
 /// Refuses a plan that would not do what it is for, unless that is wanted.
-fn check_fault(plan: &Plan, args: &PlanArgs) -> anyhow::Result<()> {
+pub fn check_fault(plan: &Plan, allow_miss: bool, out: &Path) -> anyhow::Result<()> {
     match shortcoming(plan) {
-        Some(Shortcoming { message, is_severe }) if is_severe && !args.allow_miss => bail!(
+        Some(Shortcoming { message, is_severe }) if is_severe && !allow_miss => bail!(
             "{message}; `{}` is not written, --allow-miss would write it",
-            args.out.display()
+            out.display()
         ),
         _ => Ok(()),
     }
 }
 
-/// Where a reason about an identified rope can be looked at.
+/// How the track behind an identified rope can be looked at.
 pub const LOOK: &str =
     "look at an overlay of the film that it was identified from (`wag track --overlay`)";
 
@@ -48,7 +48,12 @@ fn ensemble(args: &PlanArgs) -> anyhow::Result<PosteriorEnsemble> {
         );
         return Ok(PosteriorEnsemble::default());
     };
-    let forecast = PosteriorEnsemble::FORECAST;
+    // A file of before does not say how well the model explains the film.
+    let forecast = if posterior.residual_m > 0.0 {
+        PosteriorEnsemble::FORECAST
+    } else {
+        0
+    };
     let drawn = PosteriorEnsemble::drawn(&rope, &posterior, args.robust, forecast, args.seed);
     let count = drawn.optimised.len();
     ensure!(
@@ -142,7 +147,7 @@ pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
     let mut plan = planner::plan(&request, &mut |p| stage.go_on(&p)).map_err(classify)?;
     plan.unconfirmed = unconfirmed;
     let warnings = warnings(&plan);
-    check_fault(&plan, args).or_failed()?;
+    check_fault(&plan, args.allow_miss, &args.out).or_failed()?;
     stage.done(&describe(&plan));
     files::write_json(&args.out, &plan).or_failed()?;
     if let Some(path) = &args.csv {

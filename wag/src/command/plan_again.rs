@@ -1,39 +1,25 @@
 //! `wag plan again`: the last strike, corrected by its miss.
 
-use super::plan::{classify, describe, tell};
+use super::plan::{check_fault, classify, describe, tell};
 use crate::cli::AgainArgs;
 use crate::config;
-use anyhow::Context;
 use arm_model::Limits;
 use cli_output::{OrInput, Outcome, Stage};
 use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, plan_again, warnings};
-use run_log::files;
+use run_log::{Run, files};
 use serde_json::{Value, json};
-use std::path::Path;
-
-/// The miss that a run's camera measured (m).
-fn measured(run: &Path) -> anyhow::Result<[f64; 3]> {
-    let path = run.join(files::SUMMARY);
-    let summary: Value = files::read_json(&path)?;
-    let miss = serde_json::from_value(summary["score"]["miss_m"].clone());
-    miss.with_context(|| {
-        format!(
-            "`{}` has no miss by the camera (`score.miss_m`): name it with --miss",
-            path.display()
-        )
-    })
-}
 
 pub fn run(args: &AgainArgs) -> Outcome<Option<Value>> {
-    let is_run = args.last.is_dir();
-    let plan = is_run.then(|| args.last.join(files::PLAN));
-    let last = files::read_plan(plan.as_ref().unwrap_or(&args.last)).or_input()?;
-    let miss_m = match args.miss {
-        Some(miss) => miss.0,
-        None if is_run => measured(&args.last).or_input()?,
-        None => {
+    let run = args.last.is_dir().then(|| Run::open(&args.last));
+    let run = run.transpose().or_input()?;
+    let in_run = run.as_ref().map(|run| run.folder().join(files::PLAN));
+    let last = files::read_plan(in_run.as_ref().unwrap_or(&args.last)).or_input()?;
+    let miss_m = match (args.miss, &run) {
+        (Some(miss), _) => miss.0,
+        (None, Some(run)) => run.miss_m().or_input()?,
+        (None, None) => {
             return Err(bad_input!(
                 "where did the tip pass? Name it with --miss X,Y,Z, as `wag score` prints it"
             ));
@@ -46,7 +32,9 @@ pub fn run(args: &AgainArgs) -> Outcome<Option<Value>> {
     let request = PlanRequest {
         goal: config.goal(last.task, last.target_m),
         rope: last.rope,
-        cell: config::cell_for(&last).or_input()?,
+        cell: run
+            .map_or_else(|| config::cell_for(&last), |run| config::cell_of(&run))
+            .or_input()?,
         options: PlanOptions {
             seed: last.seed,
             ..config.search
@@ -58,6 +46,7 @@ pub fn run(args: &AgainArgs) -> Outcome<Option<Value>> {
     let stage = Stage::begin("plan");
     let plan = plan_again(&request, &last, miss_m).map_err(classify)?;
     stage.done(&describe(&plan));
+    check_fault(&plan, args.allow_miss, &args.out).or_failed()?;
     tell(&plan);
     files::write_json(&args.out, &plan).or_failed()?;
     println!("corrected plan written to `{}`", args.out.display());

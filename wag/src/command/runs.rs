@@ -5,8 +5,9 @@ use crate::config;
 use anyhow::Context;
 use cli_output::{OrInput, Outcome, is_interrupted, output};
 use rt_controller::recording::{CORE_VERSION, Gap, Replay};
-use run_log::{CYCLES_TABLE, Run, files};
+use run_log::{CYCLES_TABLE, Explanation, Run, Stop, files};
 use serde_json::{Value, json};
+use shared_types::FaultCode;
 use std::path::Path;
 
 /// Steps the controller's core over a run again and compares every record, bit by bit.
@@ -104,8 +105,11 @@ pub fn explain(path: &Path) -> Outcome<Option<Value>> {
 /// Keeps the explanation of a run that was stopped and shows it to people.
 pub fn explain_stop(run: &Path) {
     let cause = Run::open(run).ok().and_then(|run| run.keep_cause());
-    // Who interrupted it knows why.
-    if let Some(found) = cause.filter(|found| found.stopped && !is_interrupted()) {
+    // Who interrupted it knows why it stopped, if nothing else stopped it before.
+    let by_user =
+        |stop: &Stop| matches!(stop.code, FaultCode::OperatorStop | FaultCode::OperatorLost);
+    let known = |found: &Explanation| is_interrupted() && found.stops.iter().all(by_user);
+    if let Some(found) = cause.filter(|found| found.stopped && !known(found)) {
         output::remark(format_args!("{}", run_log::show(&found).trim_end()));
     }
 }

@@ -58,7 +58,7 @@ pub fn cell_for(plan: &Plan) -> anyhow::Result<Cell> {
     {
         bail!(
             "the plan was made for another cell: {differs}; pass the plan's cell with --cell FILE \
-             (a run's is RUN/config/cell.toml), or plan again"
+             (a run's is RUN/config/cell.toml), or plan anew"
         );
     }
     Ok(here)

@@ -176,7 +176,7 @@ fn a_plan_is_for_the_cell_that_it_was_made_for() {
     put(&plan);
     for command in ["check", "throw --dry-run"] {
         let line = format!("{command} plan.json");
-        let words = "pole.length_m = 0.3 | 0.2 | --cell | plan again";
+        let words = "pole.length_m = 0.3 | 0.2 | --cell | plan anew";
         are_refused_in(dir.path(), 2, &format!("{line} => {words}"));
         json_in(dir.path(), &format!("{line} --cell cell.toml"));
     }

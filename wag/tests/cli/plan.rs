@@ -20,11 +20,16 @@ fn a_correction_without_a_miss_or_a_throw_is_refused() {
     put("run/plan.json", &plan.to_string());
     put("run/summary.json", "{\"ok\": true}");
     put("rope.toml", ROPE);
+    std::fs::create_dir(dir.path().join("hidden")).unwrap();
+    put("hidden/plan.json", &plan.to_string());
+    let score = "{\"score\": {\"miss_m\": [0.1, 0, 0], \"interval_m\": [0.0, 0.199]}}";
+    put("hidden/summary.json", score);
     are_refused_in(
         dir.path(),
         2,
         "plan again plan.json --out p.json => --miss | wag score
          plan again run --out p.json => summary.json | --miss
+         plan again hidden --out p.json => 0.199 m only | --miss
          plan again gone.json --miss 0,0,0.01 --out p.json => gone.json
          plan again rope.toml --miss 0,0,0.01 --out p.json => `rope.toml` is no plan
          plan again plan.json --miss 0,0.2,0 --out p.json => 20.0 cm

@@ -4,7 +4,7 @@
 //! pixel's difference from the scene is split along and across the scene's colour: a
 //! change of hue counts fully, brightening half, darkening hardly.
 //!
-//! A rope fills little of its environment. Where evidence fills a large part of them,
+//! A rope fills little of what surrounds it. Where evidence fills a large part of that,
 //! something else is there (a person, a door, the arm), and what is seen there tells nothing
 //! about the rope.
 
@@ -24,11 +24,11 @@ const BLACK: f32 = 100.0;
 
 /// Cells along the picture's height.
 const CELLS_HIGH: usize = 47;
-/// Environment: this many cells to every side.
+/// What surrounds a cell: this many of them to every side.
 const AROUND: usize = 4;
 /// Every which pixel of a cell is looked at, in both directions.
 const EVERY: usize = 4;
-/// Part of the environment from which evidence begins to count less, and from which it
+/// Part of what surrounds a cell from which evidence begins to count less, and from which it
 /// counts nothing.
 const FILLED: [f32; 2] = [0.45, 0.7];
 

@@ -147,6 +147,9 @@ impl Reality<'_> {
                 forecast: plan.forecast,
                 warned: !warnings(&plan).is_empty(),
             }));
+            if fates.len() == N {
+                break;
+            }
             let mut error_m = || MISS_STD_M * rng.sample::<f64, _>(StandardNormal);
             let measured = miss + Vector3::from_fn(|_, _| error_m());
             planned = plan_again(&request, &plan, measured.into()).context("planning again");
