@@ -90,6 +90,13 @@ fn a_straight_flight_is_measured_between_frames() {
     assert!((score.time_s - 0.25).abs() < 0.003, "{}", score.time_s);
     assert!((Vector3::from(score.target_m) - Vector3::from(TARGET)).norm() < 0.005);
     assert!(score.interval_m[0] < 0.05 && 0.05 < score.interval_m[1]);
+    // Above the target, in the world's axes.
+    let miss = Vector3::from(score.miss_m);
+    assert!(
+        (miss - Vector3::new(0.0, 0.0, 0.05)).norm() < 0.004,
+        "{miss}"
+    );
+    assert!((miss.norm() - score.closest_m).abs() < 1e-12, "{miss}");
     assert!(score.tip_path.len() >= 25);
 }
 
