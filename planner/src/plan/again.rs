@@ -182,22 +182,11 @@ fn turned_by(
 mod tests {
     use super::*;
     use crate::PlannerConfig;
+    use crate::plan::tests::request;
     use crate::plan::{ThrowSimulator, plan, simulator_for};
-    use crate::ropes::random_rope;
     use rope_sim::{Candidate, FrameTimes, PlannedArm, roll_out};
     use shared_types::RopeParams;
     use std::ops::ControlFlow;
-
-    fn request(task: Task, target_m: [f64; 3]) -> PlanRequest {
-        let goal = PlannerConfig::default().goal(task, target_m);
-        let options = PlanOptions {
-            population: 24,
-            generations: Some(12),
-            searches: 1,
-            ..PlanOptions::default()
-        };
-        PlanRequest::new(goal, &random_rope(11), options)
-    }
 
     fn planned(request: &PlanRequest) -> Plan {
         plan(request, &mut |_| ControlFlow::Continue(())).unwrap()
@@ -226,7 +215,7 @@ mod tests {
 
     #[test]
     fn a_throw_with_times_of_its_own_keeps_them() {
-        let mut request = request(Task::Strike, [0.95, 0.25, 0.1]);
+        let mut request = request([0.95, 0.25, 0.1]);
         let plain = request.clone();
         request.options.segment_stretch_max = 1.3;
         let thrown = planned(&request);
@@ -246,7 +235,7 @@ mod tests {
     #[test]
     fn what_persists_of_a_miss_is_taken_out() {
         for target_m in [[0.95, 0.25, 0.1], [0.9, -0.3, 0.4]] {
-            let request = request(Task::Strike, target_m);
+            let request = request(target_m);
             let truth = RopeParams {
                 length_m: request.rope.length_m + 0.008,
                 joint_stiffness_nm_per_rad: 1.3 * request.rope.joint_stiffness_nm_per_rad,
@@ -276,7 +265,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_corrected_is_refused_with_the_reason() {
-        let strike = request(Task::Strike, [0.95, 0.25, 0.1]);
+        let strike = request([0.95, 0.25, 0.1]);
         let thrown = planned(&strike);
         let refused = |request: &PlanRequest, miss_m| {
             let error = plan_again(request, &thrown, miss_m).unwrap_err();
@@ -285,7 +274,8 @@ mod tests {
         };
         assert!(refused(&strike, [0.2, 0.0, 0.0]).contains("20.0 cm is too far"));
         assert!(refused(&strike, [f64::NAN, 0.0, 0.0]).contains("too far"));
-        let lob = request(Task::Lob, [0.95, 0.25, 0.1]);
+        let mut lob = strike.clone();
+        lob.goal = PlannerConfig::default().goal(Task::Lob, thrown.target_m);
         assert!(refused(&lob, [0.01, 0.0, 0.0]).contains("only strikes"));
         let mut elsewhere = strike.clone();
         elsewhere.cell.floor_z_m -= 0.1;

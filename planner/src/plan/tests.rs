@@ -8,7 +8,7 @@ use shared_types::ipc::message::Progress;
 use std::ops::ControlFlow;
 
 /// A small search for a strike.
-fn request(target_m: [f64; 3]) -> PlanRequest {
+pub(super) fn request(target_m: [f64; 3]) -> PlanRequest {
     let goal = PlannerConfig::default().goal(Task::Strike, target_m);
     let options = PlanOptions {
         population: 24,

@@ -71,46 +71,40 @@ impl Mujoco {
         times: &FrameTimes,
         nodes: usize,
     ) -> anyhow::Result<Vec<Vector3<f64>>> {
-        let mut found = Err(anyhow!("no step"));
-        for step_s in STEPS_S {
-            found = self.simulate_in(rope, &motion, seed, times, nodes, step_s);
-            if !matches!(&found, Err(why) if why.to_string().contains(BLEW_UP)) {
-                break;
+        let times_s: Vec<f64> = (0..times.count).map(|i| times.time_s(i)).collect();
+        let last_s = *times_s.last().context("no time is asked for")?;
+        let answer = |step_s: f64| {
+            let steps = (last_s / step_s).ceil() as usize;
+            let request = Request {
+                rope: &rope.params,
+                refinement: rope.refinement,
+                clamp_tilt_rad: rope.clamp_tilt_rad,
+                sway: serde_json::json!({
+                    "angle_rad": rope.sway.angle_rad,
+                    "rate_rad_s": rope.sway.rate_rad_s,
+                }),
+                seed,
+                pose_period_s: step_s,
+                poses: (0..=steps)
+                    .map(|i| pose(&motion(i as f64 * step_s)))
+                    .collect(),
+                nodes,
+                times_s: times_s.clone(),
+            };
+            self.ask(&serde_json::to_vec(&request)?)
+        };
+        let blew_up = |found: &anyhow::Result<_>| {
+            let why = found.as_ref().err().map(ToString::to_string);
+            why.is_some_and(|why| why.contains(BLEW_UP))
+        };
+        let [first, shorter @ ..] = STEPS_S;
+        let mut found = answer(first);
+        for step_s in shorter {
+            if blew_up(&found) {
+                found = answer(step_s);
             }
         }
-        found
-    }
-
-    fn simulate_in(
-        &self,
-        rope: &OtherRope,
-        motion: impl Fn(f64) -> FrameMotion,
-        seed: u64,
-        times: &FrameTimes,
-        nodes: usize,
-        step_s: f64,
-    ) -> anyhow::Result<Vec<Vector3<f64>>> {
-        let times_s: Vec<f64> = (0..times.count).map(|i| times.time_s(i)).collect();
-        let last_s = times_s.last().context("no time is asked for")?;
-        let steps = (last_s / step_s).ceil() as usize;
-        let request = Request {
-            rope: &rope.params,
-            refinement: rope.refinement,
-            clamp_tilt_rad: rope.clamp_tilt_rad,
-            sway: serde_json::json!({
-                "angle_rad": rope.sway.angle_rad,
-                "rate_rad_s": rope.sway.rate_rad_s,
-            }),
-            seed,
-            pose_period_s: step_s,
-            poses: (0..=steps)
-                .map(|i| pose(&motion(i as f64 * step_s)))
-                .collect(),
-            nodes,
-            times_s,
-        };
-        let answer: Answer = serde_json::from_slice(&self.ask(&serde_json::to_vec(&request)?)?)
-            .context("answer of MuJoCo's rope")?;
+        let answer: Answer = serde_json::from_slice(&found?).context("answer of MuJoCo's rope")?;
         ensure!(
             answer.nodes_m.len() == 3 * nodes * times.count,
             "MuJoCo's rope answered with {} numbers, not {}",
