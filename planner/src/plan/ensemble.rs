@@ -31,8 +31,9 @@ pub struct PosteriorEnsemble {
 /// The discrepancy of a throw over what the fit left of the wiggle's film. What the model does
 /// not explain of the one, it does not foresee of the other; a throw is faster, and is
 /// seen from no camera that the fit could move. Tuned in another reality (`experiments
-/// full-pipeline`, odd seeds).
-const DISCREPANCY_PER_RESIDUAL: f64 = 3.0;
+/// full-pipeline`, seeds 1, 3 and 5: of 39 throws without the chain 34 lay within their 90 %
+/// intervals).
+const DISCREPANCY_PER_RESIDUAL: f64 = 4.0;
 
 impl PosteriorEnsemble {
     /// Ropes that a forecast is made with.
