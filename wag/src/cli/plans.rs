@@ -7,6 +7,22 @@ use cli_output::seed;
 use shared_types::CommandInterface;
 use std::path::PathBuf;
 
+/// What every plan is made with.
+#[derive(Debug, Args)]
+pub struct PlannerArgs {
+    /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
+    #[arg(long)]
+    pub limits: Option<PathBuf>,
+    /// Tuned values of the planner (TOML), laid over the effective ones (`wag config show
+    /// planner`).
+    #[arg(long)]
+    pub config: Option<PathBuf>,
+    /// The arm's response as written by `wag latency` (TOML): the throw is planned for an
+    /// arm with this response, and its commands compensate for it.
+    #[arg(long, value_name = "FILE")]
+    pub arm_response: Option<PathBuf>,
+}
+
 #[derive(Debug, Args)]
 pub struct PlanArgs {
     /// Rope parameters.
@@ -18,13 +34,8 @@ pub struct PlanArgs {
     /// Target x,y,z in the arm's base frame (m).
     #[arg(long, allow_hyphen_values = true)]
     pub target: Point,
-    /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
-    #[arg(long)]
-    pub limits: Option<PathBuf>,
-    /// Tuned values of the planner (TOML), laid over the effective ones (`wag config show
-    /// planner`).
-    #[arg(long)]
-    pub config: Option<PathBuf>,
+    #[command(flatten)]
+    pub planner: PlannerArgs,
     /// Seed of the search.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
@@ -46,10 +57,6 @@ pub struct PlanArgs {
     /// most likely rope alone.
     #[arg(long, default_value_t = 0, value_name = "K")]
     pub robust: usize,
-    /// The arm's response as written by `wag latency` (TOML): the throw is planned for an
-    /// arm with this response, and its commands compensate for it.
-    #[arg(long, value_name = "FILE")]
-    pub arm_response: Option<PathBuf>,
     /// Draw the reachable targets of this rope (SVG), and refuse a target that is not reachable.
     #[arg(long, value_name = "FILE")]
     pub reach: Option<PathBuf>,
@@ -63,16 +70,8 @@ pub struct AgainArgs {
     /// base frame (m). Default: as the run's camera measured it.
     #[arg(long, allow_hyphen_values = true)]
     pub miss: Option<Point>,
-    /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
-    #[arg(long)]
-    pub limits: Option<PathBuf>,
-    /// Tuned values of the planner (TOML), laid over the effective ones (`wag config show
-    /// planner`).
-    #[arg(long)]
-    pub config: Option<PathBuf>,
-    /// The arm's response that the plan was made with (TOML).
-    #[arg(long, value_name = "FILE")]
-    pub arm_response: Option<PathBuf>,
+    #[command(flatten)]
+    pub planner: PlannerArgs,
     /// Write the plan even if it is predicted to pass its aim by more than 5 cm.
     #[arg(long)]
     pub allow_miss: bool,

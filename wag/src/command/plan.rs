@@ -1,7 +1,7 @@
 //! `wag plan`: from a rope and a target to a checked plan.
 
 use super::unconfirmed::confirm;
-use crate::cli::PlanArgs;
+use crate::cli::{PlanArgs, PlannerArgs};
 use crate::config;
 use anyhow::{bail, ensure};
 use arm_model::Limits;
@@ -36,6 +36,15 @@ pub fn check_fault(plan: &Plan, allow_miss: bool, out: &Path) -> anyhow::Result<
 /// How the track behind an identified rope can be looked at.
 pub const LOOK: &str =
     "look at an overlay of the film that it was identified from (`wag track --overlay`)";
+
+/// What a plan is made with: limits, the planner's values, how the arm follows.
+pub fn read(args: &PlannerArgs) -> anyhow::Result<(Limits, PlannerConfig, Option<Following>)> {
+    let limits = config::here(args.limits.as_deref())?;
+    let config = config::here(args.config.as_deref())?;
+    let response = args.arm_response.as_deref().map(files::read_arm_response);
+    let following = response.transpose()?.map(|r| Following::new(&r, &limits));
+    Ok((limits, config, following))
+}
 
 /// What is known about the rope beyond its parameters, for forecast and `--robust`.
 fn ensemble(args: &PlanArgs) -> anyhow::Result<PosteriorEnsemble> {
@@ -118,11 +127,8 @@ pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
     let rope = files::read_rope(&args.rope).or_input()?;
     let unconfirmed = files::read_unconfirmed(&args.rope).or_input()?;
     confirm(&unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
-    let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
-    let config: PlannerConfig = config::here(args.config.as_deref()).or_input()?;
+    let (limits, config, following) = read(&args.planner).or_input()?;
     let ensemble = ensemble(args).or_input()?;
-    let response = args.arm_response.as_deref().map(files::read_arm_response);
-    let response = response.transpose().or_input()?;
     if let Some(path) = &args.reach {
         clear_of_arm(args.target.0, &config.cell).map_err(classify)?;
         reach(path, args, &limits, &config)?;
@@ -142,7 +148,7 @@ pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
             ..config.search
         },
         ensemble,
-        following: response.map(|r| Following::new(&r, &limits)),
+        following,
     };
     let mut plan = planner::plan(&request, &mut |p| stage.go_on(&p)).map_err(classify)?;
     plan.unconfirmed = unconfirmed;

@@ -1,12 +1,9 @@
 //! `wag plan again`: the last strike, corrected by its miss.
 
-use super::plan::{check_fault, classify, describe, tell};
+use super::plan::{check_fault, classify, describe, read, tell};
 use crate::cli::AgainArgs;
 use crate::config;
-use arm_model::Limits;
 use cli_output::{OrInput, Outcome, Stage};
-use planner::PlannerConfig;
-use planner::arm_response::Following;
 use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, plan_again, warnings};
 use run_log::{Run, files};
 use serde_json::{Value, json};
@@ -25,10 +22,7 @@ pub fn run(args: &AgainArgs) -> Outcome<Option<Value>> {
             ));
         }
     };
-    let limits = config::here::<Limits>(args.limits.as_deref()).or_input()?;
-    let config: PlannerConfig = config::here(args.config.as_deref()).or_input()?;
-    let response = args.arm_response.as_deref().map(files::read_arm_response);
-    let response = response.transpose().or_input()?;
+    let (limits, config, following) = read(&args.planner).or_input()?;
     let request = PlanRequest {
         goal: config.goal(last.task, last.target_m),
         rope: last.rope,
@@ -40,7 +34,7 @@ pub fn run(args: &AgainArgs) -> Outcome<Option<Value>> {
             ..config.search
         },
         ensemble: PosteriorEnsemble::default(),
-        following: response.map(|r| Following::new(&r, &limits)),
+        following,
         limits,
     };
     let stage = Stage::begin("plan");
