@@ -88,6 +88,19 @@ impl Grid {
             follows,
         }
     }
+
+    /// The least weight among a cell, the one before it in time and those before both along
+    /// the rope.
+    pub(super) fn least_weight(&self, index: usize) -> f64 {
+        let k = self.keypoints;
+        let pair = |i: usize| [Some(i), (!i.is_multiple_of(k)).then(|| i - 1)];
+        let earlier = (index >= k && self.follows[index / k]).then(|| index - k);
+        let cells = pair(index)
+            .into_iter()
+            .chain(earlier.into_iter().flat_map(pair));
+        let weights = cells.flatten().filter_map(|i| Some(self.cells[i]?.weight));
+        weights.fold(1.0, f64::min)
+    }
 }
 
 /// The observation in the form the fit compares.

@@ -221,9 +221,11 @@ fn compare(
         axis[RESIDUAL] += comparison.more_links * axis[LINKS];
     }
     let (mut sum, mut count) = (0.0, 0.0);
-    for row in rows.iter().flatten() {
-        sum += row[0][RESIDUAL].powi(2) + row[1][RESIDUAL].powi(2);
-        count += 1.0;
+    for (row, cell) in rows.iter().zip(cells) {
+        if let (Some(row), Some(cell)) = (row, cell) {
+            sum += cell.weight * (row[0][RESIDUAL].powi(2) + row[1][RESIDUAL].powi(2));
+            count += 1.0;
+        }
     }
     let distance_px = (sum / f64::max(count, 1.0)).sqrt();
     distance_px.is_finite().then_some(Linearised {
@@ -271,12 +273,11 @@ impl Comparison<'_> {
             }
         }
         let [c, s] = self.tangent(&now, detection.along)?;
-        let weight = detection.weight.sqrt();
         let mut turned = [[0.0; FREE + 1]; 2];
         for i in 0..=FREE {
             let (u, v) = (out[0][i], out[1][i]);
-            turned[0][i] = weight * (c * u + s * v);
-            turned[1][i] = weight * (c * v - s * u);
+            turned[0][i] = c * u + s * v;
+            turned[1][i] = c * v - s * u;
         }
         Some(turned)
     }

@@ -57,7 +57,9 @@ impl Noise {
     }
 
     /// Divides by the noise and takes the correlations out, in place, of the slopes over
-    /// the first `fitted` coordinates and of the residual.
+    /// the first `fitted` coordinates and of the residual. What is left of a detection
+    /// counts as much as the least certain of those it was compared with: weighed before,
+    /// weights that come and go would look like motion.
     pub(super) fn whiten(&self, grid: &Grid, rows: &mut Rows, fitted: usize) {
         let k = grid.keypoints;
         for (axis, noise) in self.axes.iter().enumerate() {
@@ -75,6 +77,14 @@ impl Noise {
             for index in (1..rows.len()).rev() {
                 if index % k != 0 {
                     subtract(rows, [index, index - 1], (axis, fitted), noise.along_rope);
+                }
+            }
+        }
+        for (index, row) in rows.iter_mut().enumerate() {
+            let scale = grid.least_weight(index).sqrt();
+            for axis in row.iter_mut().flatten() {
+                for column in (0..fitted).chain([RESIDUAL]) {
+                    axis[column] *= scale;
                 }
             }
         }
@@ -100,7 +110,10 @@ fn subtract(
 
 /// The noise that residuals show in one axis.
 fn estimate_axis(grid: &Grid, rows: &Rows, axis: usize) -> KeypointNoise {
-    let residual = |i: usize| rows[i].as_ref().map(|r| r[axis][RESIDUAL]);
+    let residual = |i: usize| {
+        let (row, cell) = (rows[i].as_ref()?, grid.cells[i]?);
+        Some(cell.weight.sqrt() * row[axis][RESIDUAL])
+    };
     let mut sizes: Vec<f64> = (0..rows.len()).filter_map(residual).map(f64::abs).collect();
     if sizes.is_empty() {
         return Noise::white(1.0).axes[axis];
@@ -138,7 +151,42 @@ fn estimate_axis(grid: &Grid, rows: &Rows, axis: usize) -> KeypointNoise {
 
 #[cfg(test)]
 mod tests {
+    use super::super::film::Detection;
     use super::*;
+
+    /// A displacement that lasts is no motion, whatever the tracker's confidence does meanwhile.
+    #[test]
+    fn confidence_that_comes_and_goes_does_not_look_like_motion() {
+        const FRAMES: usize = 6;
+        let weights = [0.98, 0.5, 0.98, 0.92, 0.98, 0.6];
+        let cell = |weight| {
+            Some(Detection {
+                time_s: 0.0,
+                along: 0.5,
+                pixel: [0.0; 2],
+                weight,
+            })
+        };
+        let grid = Grid {
+            keypoints: 1,
+            cells: weights.map(cell).to_vec(),
+            follows: (0..FRAMES).map(|i| i > 0).collect(),
+        };
+        let mut row = [0.0; FREE + 1];
+        row[RESIDUAL] = 0.3;
+        let mut rows: Rows = vec![Some([row; 2]); FRAMES];
+        let slow = KeypointNoise {
+            sigma_px: 0.2,
+            in_time: 0.96,
+            along_rope: 0.0,
+        };
+        Noise { axes: [slow; 2] }.whiten(&grid, &mut rows, 0);
+        let alone = 0.3 / 0.2 * (1.0 - 0.96) / (1.0 - 0.96_f64.powi(2)).sqrt();
+        for (i, row) in rows.iter().enumerate().skip(1) {
+            let expected = alone * weights[i].min(weights[i - 1]).sqrt();
+            assert!((row.unwrap()[0][RESIDUAL] - expected).abs() < 1e-12, "{i}");
+        }
+    }
 
     #[test]
     fn a_least_noise_raises_the_smaller_axis_alone() {

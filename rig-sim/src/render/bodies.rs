@@ -99,11 +99,7 @@ impl Cast<'_> {
             .chunk_by(together)
             .map(|spell| Spell {
                 first: first_of(spell),
-                arm: Strokes::of(
-                    image,
-                    light,
-                    arm_solids(self.cell, &spell[spell.len() / 2].q),
-                ),
+                arm: Strokes::of(image, light, self.arm(&spell[spell.len() / 2].q)),
                 others: Strokes::of(image, light, self.others.iter().copied()),
                 ropes: spell
                     .iter()
@@ -112,44 +108,51 @@ impl Cast<'_> {
             })
             .collect()
     }
-}
 
-/// Links in white with grey joints, a black flange, a carbon pole.
-pub(super) fn arm_solids(cell: &Cell, q: &JointVector) -> Vec<Solid> {
-    const WHITE: [u8; 3] = [226, 228, 230];
-    const GREY: [u8; 3] = [148, 151, 156];
-    const DARK: [u8; 3] = [58, 60, 64];
-    const BASE: [u8; 3] = [66, 68, 72];
-    const PAINT: [[u8; 3]; 12] = [
-        BASE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, GREY, DARK,
-    ];
-    let (links, pole) = arm_at(q, &cell.pole);
-    let links = links.iter().zip(PAINT);
-    let collar = pole.b_m + (pole.a_m - pole.b_m).normalize() * 0.012;
-    let foot = |x: f64| Vector3::new(x, 0.0, 0.012);
-    links
-        .map(|((_, c), rgb)| {
-            // The base's capsule reaches into the column it stands on.
-            let sunk = Vector3::z() * (c.radius_m - c.a_m.z).max(0.0);
-            let a = if rgb == BASE { c.a_m + sunk } else { c.a_m };
-            Solid::new(&a, &c.b_m, c.radius_m, Material::plain(rgb, 46.0))
-        })
-        .chain([
-            Solid::new(
-                &foot(-0.07),
-                &foot(0.07),
-                0.012,
-                Material::plain(GREY, 46.0),
-            ),
-            Solid::new(
-                &pole.a_m,
-                &pole.b_m,
-                pole.radius_m,
-                Material::plain(DARK, 60.0),
-            ),
-            Solid::new(&collar, &pole.b_m, 0.011, Material::plain(GREY, 70.0)),
-        ])
-        .collect()
+    /// Links in white with grey joints, a black flange, a carbon pole, and at its end a collar
+    /// out of which the rope hangs.
+    pub(super) fn arm(&self, q: &JointVector) -> Vec<Solid> {
+        const WHITE: [u8; 3] = [226, 228, 230];
+        const GREY: [u8; 3] = [148, 151, 156];
+        const DARK: [u8; 3] = [58, 60, 64];
+        const BASE: [u8; 3] = [66, 68, 72];
+        const PAINT: [[u8; 3]; 12] = [
+            BASE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, WHITE, GREY, WHITE, GREY, DARK,
+        ];
+        let (links, pole) = arm_at(q, &self.cell.pole);
+        let links = links.iter().zip(PAINT);
+        // The rope's first joint is where it leaves the collar: the round end of a capsule lies
+        // inside the rope.
+        let rope_radius_m = self.rope.shape.radius_m;
+        let collar_radius_m = f64::max(0.011, rope_radius_m + 0.002);
+        let upwards = (pole.a_m - pole.b_m).normalize();
+        let bottom = pole.b_m + upwards * (collar_radius_m.powi(2) - rope_radius_m.powi(2)).sqrt();
+        let top = bottom + upwards * 0.012;
+        let foot = |x: f64| Vector3::new(x, 0.0, 0.012);
+        links
+            .map(|((_, c), rgb)| {
+                // The base's capsule reaches into the column it stands on.
+                let sunk = Vector3::z() * (c.radius_m - c.a_m.z).max(0.0);
+                let a = if rgb == BASE { c.a_m + sunk } else { c.a_m };
+                Solid::new(&a, &c.b_m, c.radius_m, Material::plain(rgb, 46.0))
+            })
+            .chain([
+                Solid::new(
+                    &foot(-0.07),
+                    &foot(0.07),
+                    0.012,
+                    Material::plain(GREY, 46.0),
+                ),
+                Solid::new(
+                    &pole.a_m,
+                    &bottom,
+                    pole.radius_m,
+                    Material::plain(DARK, 60.0),
+                ),
+                Solid::new(&top, &bottom, collar_radius_m, Material::plain(GREY, 70.0)),
+            ])
+            .collect()
+    }
 }
 
 /// Sizes and surfaces of the rope.
@@ -230,4 +233,36 @@ pub(super) fn target_solids(cell: &Cell, at: &Vector3<f64>, appearance: &Appeara
             Solid::new(at, at, TARGET_RADIUS_M, ball),
         ])
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What can be seen of the rope begins where its first joint is: there, its surface and
+    /// the collar's meet.
+    #[test]
+    fn the_rope_comes_out_of_the_collar_where_it_is_held() {
+        let cell = Cell::default();
+        let q = JointVector::from([0.1, 0.4, 0.0, 2.0, 0.2, 1.4, 0.0]);
+        let (held_m, attitude) = cell.pole.attach_pose(&q);
+        for radius_m in [0.003, 0.015] {
+            let shape = RopeShape {
+                radius_m,
+                lead_radius_m: 0.02,
+            };
+            let appearance = Appearance::from_seed(1);
+            let cast = Cast {
+                cell: &cell,
+                rope: &RopeLook::plain(shape, &appearance),
+                others: &[],
+            };
+            let solids = cast.arm(&q);
+            let collar = solids.last().unwrap();
+            let edge_m = held_m + attitude.column(0) * radius_m;
+            let from_m = (edge_m - collar.b_m).norm() - collar.radius_m;
+            assert!(from_m.abs() < 1e-9, "{from_m}");
+            assert!(collar.radius_m > radius_m);
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! The shadows of moving things during one exposure, in the lamps' own pictures.
 
-use super::bodies::{Cast, ScenePose, arm_solids};
+use super::bodies::{Cast, ScenePose};
 use super::lamp_view::{Cover, LampView};
 
 /// Places of the rope during one exposure whose shadows are drawn.
@@ -32,7 +32,7 @@ impl Shadows {
         let Some(middle) = poses.get(poses.len() / 2) else {
             return;
         };
-        let mut solids = arm_solids(cast.cell, &middle.q);
+        let mut solids = cast.arm(&middle.q);
         solids.extend(cast.others);
         for (view, still) in self.views.iter().zip(&mut self.still) {
             still.clear();

@@ -16,14 +16,14 @@ pub(super) struct End {
 }
 
 impl End {
-    /// How many of a curve's points the tip weight does not hide.
+    /// How many of a curve's points the tip weight, blurred as it is, does not hide.
     pub(super) fn nodes_shown(&self, curve: &[Pixel]) -> usize {
-        let mut from_end_px = -self.centre_px;
+        let mut before_px = self.centre_px;
         for node in (1..curve.len()).rev() {
-            if from_end_px >= self.radius_px {
+            if before_px >= self.radius_px + BLUR_PX {
                 return node + 1;
             }
-            from_end_px += distance_px(curve[node - 1], curve[node]);
+            before_px += distance_px(curve[node - 1], curve[node]);
         }
         1
     }
