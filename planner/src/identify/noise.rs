@@ -58,8 +58,8 @@ impl Noise {
 
     /// Divides by the noise and takes the correlations out, in place, of the slopes over
     /// the first `fitted` coordinates and of the residual. What is left of a detection
-    /// counts as much as the least certain of those it was compared with: weighed before,
-    /// weights that come and go would look like motion.
+    /// counts as much as the least certain of those it was compared with. Weighting before
+    /// would make changing weights look like motion.
     pub(super) fn whiten(&self, grid: &Grid, rows: &mut Rows, fitted: usize) {
         let k = grid.keypoints;
         for (axis, noise) in self.axes.iter().enumerate() {

@@ -6,7 +6,7 @@ use super::end::End;
 use super::field::Offset;
 use super::statistics::mean;
 
-/// Nodes whose spacing goes on where the tip weight hides the rope.
+/// Visible nodes whose mean spacing is used behind the tip weight.
 const SPACED_LIKE: usize = 12;
 
 /// What was read.
@@ -48,8 +48,8 @@ impl Reading {
         let fraction = |node: usize| node as f64 / (curve.len() - 1) as f64;
         let edge = fraction(shown);
         let (edge_place, tip) = (curve[shown], self.tip(frame));
-        // What of the curve is hidden was not seen: the weight's centre is as far behind its
-        // edge as it looks, in the spacing of the nodes before.
+        // The hidden part of the curve is a guess: the centre's place along the rope follows
+        // from the straight distance to it, at the spacing of the last visible nodes.
         let near = shown.saturating_sub(SPACED_LIKE);
         let px = length(&curve[near..=shown]).max(1e-9);
         let last = edge + distance_px(edge_place, tip) * (edge - fraction(near)) / px;
