@@ -20,7 +20,7 @@ impl End {
     pub(super) fn nodes_shown(&self, curve: &[Pixel]) -> usize {
         let mut before_px = self.centre_px;
         for node in (1..curve.len()).rev() {
-            if before_px >= self.radius_px + BLUR_PX {
+            if before_px >= self.radius_px + 0.5 * BLUR_PX {
                 return node + 1;
             }
             before_px += distance_px(curve[node - 1], curve[node]);
