@@ -26,6 +26,8 @@
 mod boards;
 #[cfg(feature = "std")]
 mod bus;
+#[cfg(feature = "std")]
+mod bytes;
 mod cause;
 #[cfg(feature = "std")]
 mod domain;

@@ -3,14 +3,8 @@
 //! Requests and events vary in size, so they travel as postcard bytes behind a
 //! small header (magic, version, length, CRC-32). Not RT-safe.
 
-use super::bus::{Transport, open_error};
+use super::bytes::{BytesCall, BytesClient, BytesServer, PendingBytes};
 use super::{Bus, IpcError};
-use iceoryx2::active_request::ActiveRequest;
-use iceoryx2::pending_response::PendingResponse;
-use iceoryx2::port::client::Client;
-use iceoryx2::port::server::Server;
-use iceoryx2::prelude::*;
-use iceoryx2::service::port_factory::request_response::PortFactory;
 use serde::{Serialize, de::DeserializeOwned};
 use std::marker::PhantomData;
 use std::time::{Duration, Instant};
@@ -29,9 +23,6 @@ pub trait Rpc {
 
 const MAGIC: [u8; 4] = *b"WAG1";
 const HEADER: usize = 12;
-/// Events a caller may leave unread before the server has to wait.
-const EVENT_BUFFER: usize = 256;
-const MAX_CLIENTS: usize = 8;
 
 /// Wraps `value` as magic, length, CRC-32 and postcard bytes.
 ///
@@ -74,24 +65,9 @@ pub fn decode<T: DeserializeOwned>(service: &'static str, bytes: &[u8]) -> Resul
     postcard::from_bytes(body).map_err(|e| fail(&e.to_string()))
 }
 
-type BytesService = PortFactory<Transport, [u8], (), [u8], ()>;
-
-fn open<R: Rpc>(bus: &Bus) -> Result<BytesService, IpcError> {
-    bus.service(R::NAME)?
-        .request_response::<[u8], [u8]>()
-        .max_clients(MAX_CLIENTS)
-        .max_servers(1)
-        .max_nodes(MAX_CLIENTS + 1)
-        .max_active_requests_per_client(4)
-        .max_response_buffer_size(EVENT_BUFFER)
-        .enable_safe_overflow_for_responses(false)
-        .open_or_create()
-        .map_err(open_error(R::NAME))
-}
-
 /// The answering end.
 #[derive(Debug)]
-pub struct RpcServer<R: Rpc>(Server<Transport, [u8], (), [u8], ()>, PhantomData<R>);
+pub struct RpcServer<R: Rpc>(BytesServer, PhantomData<R>);
 
 impl<R: Rpc> RpcServer<R> {
     /// Opens the service. There is one server per domain.
@@ -99,14 +75,7 @@ impl<R: Rpc> RpcServer<R> {
     /// # Errors
     /// [`IpcError::Open`], for instance when another process serves already.
     pub fn open(bus: &Bus) -> Result<Self, IpcError> {
-        let server = open::<R>(bus)?
-            .server_builder()
-            .initial_max_slice_len(4096)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .backpressure_strategy(BackpressureStrategy::RetryUntilDelivered)
-            .create()
-            .map_err(open_error(R::NAME))?;
-        Ok(Self(server, PhantomData))
+        Ok(Self(BytesServer::open(bus, R::NAME)?, PhantomData))
     }
 
     /// The next request, if one waits.
@@ -115,11 +84,10 @@ impl<R: Rpc> RpcServer<R> {
     /// [`IpcError::Failed`]; [`IpcError::Message`] for one that cannot be
     /// understood (it is dropped, the caller sees its answer end).
     pub fn receive(&self) -> Result<Option<Call<R>>, IpcError> {
-        let active = self.0.receive().map_err(IpcError::transfer(R::NAME))?;
-        let Some(active) = active else {
+        let Some((request, active)) = self.0.receive(R::NAME)? else {
             return Ok(None);
         };
-        let request = decode(R::NAME, active.payload())?;
+        let request = decode(R::NAME, &request)?;
         Ok(Some(Call { request, active }))
     }
 }
@@ -129,40 +97,30 @@ impl<R: Rpc> RpcServer<R> {
 pub struct Call<R: Rpc> {
     /// What was asked.
     pub request: R::Request,
-    active: ActiveRequest<Transport, [u8], (), [u8], ()>,
+    active: BytesCall,
 }
 
 impl<R: Rpc> Call<R> {
     /// Sends one event.
     pub fn send(&self, event: &R::Event) -> Result<(), IpcError> {
-        let bytes = encode(R::NAME, event)?;
-        let loan = self.active.loan_slice_uninit(bytes.len());
-        let loan = loan.map_err(IpcError::transfer(R::NAME))?;
-        let sent = loan.write_from_slice(&bytes).send();
-        sent.map_err(IpcError::transfer(R::NAME))
+        self.active.send(R::NAME, &encode(R::NAME, event)?)
     }
 
     /// Whether the caller still listens.
     #[must_use]
     pub fn is_wanted(&self) -> bool {
-        self.active.is_connected()
+        self.active.is_wanted()
     }
 }
 
 /// The asking end.
 #[derive(Debug)]
-pub struct RpcClient<R: Rpc>(Client<Transport, [u8], (), [u8], ()>, PhantomData<R>);
+pub struct RpcClient<R: Rpc>(BytesClient, PhantomData<R>);
 
 impl<R: Rpc> RpcClient<R> {
     /// Opens the service; the server may come later.
     pub fn open(bus: &Bus) -> Result<Self, IpcError> {
-        let client = open::<R>(bus)?
-            .client_builder()
-            .initial_max_slice_len(4096)
-            .allocation_strategy(AllocationStrategy::PowerOfTwo)
-            .create()
-            .map_err(open_error(R::NAME))?;
-        Ok(Self(client, PhantomData))
+        Ok(Self(BytesClient::open(bus, R::NAME)?, PhantomData))
     }
 
     /// Sends a request.
@@ -171,23 +129,13 @@ impl<R: Rpc> RpcClient<R> {
     /// [`IpcError::Gone`] when nobody serves, else transfer errors.
     pub fn call(&self, request: &R::Request) -> Result<Pending<R>, IpcError> {
         let bytes = encode(R::NAME, request)?;
-        let loan = self.0.loan_slice_uninit(bytes.len());
-        let loan = loan.map_err(IpcError::transfer(R::NAME))?;
-        let pending = loan.write_from_slice(&bytes).send();
-        let pending = pending.map_err(IpcError::transfer(R::NAME))?;
-        if pending.number_of_server_connections() == 0 {
-            return Err(IpcError::Gone { service: R::NAME });
-        }
-        Ok(Pending(pending, PhantomData))
+        Ok(Pending(self.0.call(R::NAME, &bytes)?, PhantomData))
     }
 }
 
 /// A request on its way; events come out.
 #[derive(Debug)]
-pub struct Pending<R: Rpc>(
-    PendingResponse<Transport, [u8], (), [u8], ()>,
-    PhantomData<R>,
-);
+pub struct Pending<R: Rpc>(PendingBytes, PhantomData<R>);
 
 impl<R: Rpc> Pending<R> {
     /// The next event, if one has come.
@@ -195,12 +143,8 @@ impl<R: Rpc> Pending<R> {
     /// # Errors
     /// [`IpcError::Gone`] when the server ended before its last event.
     pub fn try_next(&self) -> Result<Option<R::Event>, IpcError> {
-        let connected = self.0.is_connected();
-        match self.0.receive().map_err(IpcError::transfer(R::NAME))? {
-            Some(response) => decode(R::NAME, response.payload()).map(Some),
-            None if !connected => Err(IpcError::Gone { service: R::NAME }),
-            None => Ok(None),
-        }
+        let event = self.0.try_next(R::NAME)?;
+        event.map(|bytes| decode(R::NAME, &bytes)).transpose()
     }
 
     /// Waits for the last event and returns it; earlier ones go to `each`.

@@ -73,9 +73,19 @@ pub(super) fn create<T: Board>(
     creator.create().map_err(open_error(T::NAME))
 }
 
-fn opened<T: Board>(bus: &Bus) -> Result<PortFactory<Transport, Key>, IpcError> {
-    let opener = bus.service(T::NAME)?.blackboard_opener::<Key>();
-    opener.open().map_err(open_error(T::NAME))
+// What follows is not generic, so that the library is compiled once for it, in this crate.
+
+fn opened(bus: &Bus, name: &'static str) -> Result<PortFactory<Transport, Key>, IpcError> {
+    let opener = bus.service(name)?.blackboard_opener::<Key>();
+    opener.open().map_err(open_error(name))
+}
+
+fn reader_of(
+    service: &PortFactory<Transport, Key>,
+    name: &'static str,
+) -> Result<Reader<Transport, Key>, IpcError> {
+    let reader = service.reader_builder().create();
+    reader.map_err(open_error(name))
 }
 
 /// Reads a blackboard of a running controller.
@@ -96,12 +106,11 @@ impl<T: Board> BoardReader<T> {
     /// # Errors
     /// [`IpcError::Open`] when there is no controller in this domain.
     pub fn open(bus: &Bus) -> Result<Self, IpcError> {
-        Self::of(&opened::<T>(bus)?)
+        Self::of(&opened(bus, T::NAME)?)
     }
 
     pub(super) fn of(service: &PortFactory<Transport, Key>) -> Result<Self, IpcError> {
-        let reader = service.reader_builder().create();
-        let reader = reader.map_err(open_error(T::NAME))?;
+        let reader = reader_of(service, T::NAME)?;
         let entries: Result<_, _> = (0..T::ENTRIES).map(|k| reader.entry(&Key(k))).collect();
         Ok(Self {
             entries: entries.map_err(open_error(T::NAME))?,
@@ -135,7 +144,7 @@ impl<T: Board> Place<T> {
     /// writer at a time.
     pub(super) fn take(bus: &Bus) -> Result<(Self, T), IpcError> {
         bus.remove_leftovers();
-        let service = opened::<T>(bus)?;
+        let service = opened(bus, T::NAME)?;
         let before = BoardReader::of(&service)?.get();
         Ok((Self::of(&service)?, before))
     }
