@@ -1,5 +1,6 @@
 //! A rig on which a fast throw is about to run, by either command interface.
 
+use arm_model::limits::LimitKind;
 use arm_model::{JointTrajectory, JointVector, Limits};
 use hil_tests::scenario::entry;
 use hil_tests::virtual_rig::{VirtualRig, VirtualRigConfig};
@@ -55,10 +56,25 @@ pub(crate) fn fastest_through(
     tick_s: f64,
     mut counts: Range<u32>,
 ) -> Option<JointTrajectory> {
-    counts.find_map(|k| {
-        let step_s = f64::from(k) * tick_s;
+    let throw = |step_s: f64| {
         let times = [0.0, step_s, 2.0 * step_s, 3.0 * step_s];
-        let throw = JointTrajectory::new(&times, poses).unwrap();
+        JointTrajectory::new(&times, poses).unwrap()
+    };
+    // The same path in another time: speeds scale with one over it, accelerations with the
+    // square, positions not. None that is faster than this can keep the limits.
+    let needed_s = limits.margins(&throw(1.0)).into_iter().map(|margin| {
+        let times_limit = 1.0 - margin.left;
+        match margin.kind {
+            LimitKind::PositionMin | LimitKind::PositionMax if margin.left < 0.0 => f64::INFINITY,
+            LimitKind::PositionMin | LimitKind::PositionMax => 0.0,
+            LimitKind::Velocity | LimitKind::TcpSpeed => times_limit,
+            LimitKind::Acceleration => times_limit.sqrt(),
+        }
+    });
+    // The tool's peak speed is sampled, so one tick is left to be tried.
+    let needed = needed_s.fold(0.0, f64::max) / tick_s - 1.0;
+    counts.find_map(|k| {
+        let throw = (f64::from(k) >= needed).then(|| throw(f64::from(k) * tick_s))?;
         limits.worst_violation(&throw).is_none().then_some(throw)
     })
 }

@@ -1,7 +1,7 @@
 //! `wag rig`: one in each domain, which leaves nothing; the vendor's own Python client
 //! against it, by the conformance check that lies beside the checkout.
 
-use super::support::{Rig, alone, has, said, shared, shared_memory_of, wag};
+use super::support::{Rig, beside_others, has, said, shared, shared_memory_of, wag};
 use rustix::process::Signal;
 use std::process::Command;
 
@@ -64,7 +64,7 @@ fn python() -> Option<Command> {
 #[test]
 fn two_clients_of_the_vendor_sdk_share_the_simulated_arm() {
     let Some(mut python) = python() else { return };
-    let _alone = alone();
+    let _turn = beside_others();
     let rig = Rig::start("");
     let ports = rig.ports();
     python.args(["-c", TWO_CLIENTS, &ports[0]]);
@@ -79,7 +79,7 @@ fn the_vendor_sdk_accepts_the_simulated_arm() {
         return;
     };
     let Some(mut python) = python() else { return };
-    let _alone = alone();
+    let _turn = beside_others();
     let rig = Rig::start("");
     let ports = rig.ports();
     let reports = ports[2..].join(",");

@@ -49,7 +49,7 @@ impl Service {
 
 #[test]
 fn a_service_takes_one_command_after_the_other_and_a_stop_is_acknowledged() {
-    let _alone = alone();
+    let _turn = alone();
     let rig = Rig::start("");
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
