@@ -20,6 +20,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     if found.is_exact() && found.cycles > 0 {
         Ok(())
     } else {
-        Err(format!("not the same to the bit: {:?}", found.first_difference).into())
+        Err(format!("not bit-exact: {:?}", found.first_difference).into())
     }
 }

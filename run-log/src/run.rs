@@ -39,7 +39,7 @@ impl CellHere {
 /// A folder or a file without a recording.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "`{}` is no run folder or file with recorded control cycles: {} (of older versions {}) \
+    "`{}` is not a run folder or file with recorded control cycles: {} (of older versions {}) \
      is not there, or the run ended or its recorder died before the controller's first cycle",
     .0.display(), files::RUN, files::CYCLES
 )]
@@ -95,7 +95,7 @@ impl Run {
         let is_named = path.extension().is_some_and(|e| e == "mcap" || e == "bin");
         ensure!(
             of_mcap || is_named,
-            "`{}` is no recording; name a run folder, or its file `{}`",
+            "`{}` is not a recording; name a run folder, or its file `{}`",
             path.display(),
             files::RUN
         );

@@ -41,7 +41,7 @@ fault_codes! {
     GuardianLost = 3:
         "the guardian that stops the arm when the controller dies is silent, or the arm does not answer it; look into its log, restart it, then run the command again";
     DeadManReleased = 4:
-        "the dead-man switch was let go, or is not held (standard input has ended); hold it, then run the command again";
+        "standard input stopped the arm (Enter or other input, or the hold-to-run key was let go), or it has ended; run the command again with it open, or the key held";
     Disarmed = 5:
         "the arming was withdrawn while the arm moved; arm again by running the command again";
     SetpointNotFinite = 10:

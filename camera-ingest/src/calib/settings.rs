@@ -132,7 +132,7 @@ pub fn check_camera(camera: &StereoCamera) -> Result<(), String> {
         if !focal.iter().all(|f| f.is_finite() && *f > 1.0) || !rest.into_iter().all(f64::is_finite)
         {
             return Err(format!(
-                "focal lengths {focal:?} px, or a number that is none"
+                "focal lengths {focal:?} px, or a value that is not a number"
             ));
         }
     }

@@ -39,7 +39,7 @@ const SILENCE: Duration = Duration::from_millis(500);
 pub struct PreviewConfig {
     /// Shared-memory domain.
     pub domain: String,
-    /// The camera's calibration and place, `camera.toml`.
+    /// The camera's calibration and extrinsics, `camera.toml`.
     pub camera: PathBuf,
     /// Keypoints per frame, clamp and lead centre included (2 to 32).
     #[serde(default = "usual_keypoints")]

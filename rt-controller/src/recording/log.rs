@@ -10,7 +10,7 @@ pub enum LogError {
     #[error("the recording is empty: nothing was recorded, or the disk was full")]
     Empty,
     /// Something else.
-    #[error("this is no recording of control cycles: it does not begin with a chunk")]
+    #[error("this is not a recording of control cycles: it does not begin with a chunk")]
     Foreign,
     /// Another layout.
     #[error(

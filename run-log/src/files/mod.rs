@@ -29,7 +29,7 @@ pub const COMMAND: &str = "command.json";
 pub const SUMMARY: &str = "summary.json";
 /// File of a run folder with the cell it ran in.
 pub const CELL: &str = "config/cell.toml";
-/// File of a run folder with the camera's calibration and place.
+/// File of a run folder with the camera's calibration and extrinsics.
 pub const CAMERA: &str = "camera.toml";
 /// File of a run folder with the tracked keypoints.
 pub const KEYPOINTS: &str = "keypoints.json";

@@ -50,7 +50,7 @@ pub fn read_cell(path: &Path) -> Result<Cell> {
 pub fn read_plan(path: &Path) -> Result<Plan> {
     let plan: Plan = serde_json::from_str(&read_text(path)?).with_context(|| {
         let name = path.display();
-        format!("`{name}` is no plan (JSON, as `wag plan` writes it)")
+        format!("`{name}` is not a plan (JSON, as `wag plan` writes it)")
     })?;
     ensure!(
         trajectory_hash_hex(&plan.trajectory) == plan.trajectory_sha256,

@@ -173,7 +173,7 @@ impl RunFilm {
             ensure!(format == "jpeg", "a picture is `{format}`, not jpeg");
             let jpeg = STANDARD
                 .decode(image.data)
-                .map_err(|error| anyhow!("a picture is no base64: {error}"))?;
+                .map_err(|error| anyhow!("a picture is not base64: {error}"))?;
             self.picture_bytes += jpeg.len();
             ensure!(
                 self.picture_bytes <= MAX_BYTES,

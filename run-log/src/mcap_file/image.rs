@@ -48,7 +48,7 @@ pub fn left_jpeg(header: &FrameHeader, yuyv: &[u8], scale: usize, quality: u8) -
             && height > 0
             && width.is_multiple_of(4)
             && yuyv.len() == 2 * width * height,
-        "the frame is no YUYV of {width} x {height} px"
+        "the frame is not YUYV of {width} x {height} px"
     );
     let side =
         |px: usize| u16::try_from(px.div_ceil(scale)).context("the frame is too large for a JPEG");

@@ -66,7 +66,7 @@ pub(super) fn walk(
 ) -> Result<Walked> {
     ensure!(
         is_mcap(bytes),
-        "this is no MCAP file: it does not begin like one"
+        "this is not an MCAP file: it does not begin like one"
     );
     let mut rest = &bytes[MAGIC.len()..];
     let mut walked = Walked::default();

@@ -160,7 +160,7 @@ mod tests {
         std::fs::write(&path, b"no such file").unwrap();
         let said = format!("{:#}", recover(&path).unwrap_err());
         assert!(
-            said.contains("no MCAP file") && said.contains("run.mcap"),
+            said.contains("not an MCAP file") && said.contains("run.mcap"),
             "{said}"
         );
     }

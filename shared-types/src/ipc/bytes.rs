@@ -1,5 +1,6 @@
-//! Bytes that are asked and answered. Nothing here is generic, so that the library's ports are
-//! compiled in this crate, and not again in every crate and test that calls a service.
+//! Requests and answers as bytes. Nothing here is generic: what uses the library's
+//! request-response ports is compiled in this crate, not in every crate and test that calls a
+//! service.
 
 use super::bus::{Transport, open_error};
 use super::{Bus, IpcError};
@@ -87,7 +88,7 @@ impl BytesClient {
         Ok(Self(client))
     }
 
-    /// [`IpcError::Gone`] when nobody serves.
+    /// Sends a request. [`IpcError::Gone`] when nobody serves.
     pub(super) fn call(&self, name: &'static str, bytes: &[u8]) -> Result<PendingBytes, IpcError> {
         let loan = self.0.loan_slice_uninit(bytes.len());
         let loan = loan.map_err(IpcError::transfer(name))?;

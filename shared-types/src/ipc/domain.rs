@@ -33,7 +33,7 @@ fn own_folder(folder: &Path, user: u32) -> Result<(), IpcError> {
     let found = folder.symlink_metadata();
     let found = found.map_err(|e| IpcError::folder(folder, e))?;
     if !found.is_dir() {
-        return Err(IpcError::folder(folder, "it is no folder"));
+        return Err(IpcError::folder(folder, "it is not a folder"));
     }
     if found.uid() != user {
         let of = format!("it belongs to user {}", found.uid());
@@ -89,6 +89,6 @@ mod tests {
         std::fs::write(&dir, "x").unwrap();
         let said = own_folder(&dir, user).unwrap_err().to_string();
         std::fs::remove_file(&dir).unwrap();
-        assert!(said.contains("no folder"), "{said}");
+        assert!(said.contains("not a folder"), "{said}");
     }
 }

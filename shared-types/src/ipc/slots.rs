@@ -73,7 +73,7 @@ pub(super) fn create<T: Board>(
     creator.create().map_err(open_error(T::NAME))
 }
 
-// What follows is not generic, so that the library is compiled once for it, in this crate.
+// These two are not generic, so that the library's part of them is compiled once, in this crate.
 
 fn opened(bus: &Bus, name: &'static str) -> Result<PortFactory<Transport, Key>, IpcError> {
     let opener = bus.service(name)?.blackboard_opener::<Key>();

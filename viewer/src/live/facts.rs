@@ -17,7 +17,7 @@ const FILES: [&str; 4] = [files::ROPE, files::PLAN, files::CAMERA, files::CELL];
 pub fn domain_of_run(run: &Path) -> anyhow::Result<String> {
     let path = run.join("config").join("rt-controller.toml");
     let text = files::read_text(&path)
-        .with_context(|| format!("`{}` is no run folder with a controller", run.display()))?;
+        .with_context(|| format!("`{}` is not a run folder with a controller", run.display()))?;
     let config: ControllerConfig =
         toml::from_str(&text).with_context(|| format!("`{}`", path.display()))?;
     Ok(config.domain)

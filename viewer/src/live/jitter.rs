@@ -28,7 +28,7 @@ impl Jitter {
 
     /// Histograms of the last ten seconds; none before the first cycle.
     pub(crate) fn histograms(&self) -> Vec<Histogram> {
-        ["late wake-up", "compute"]
+        ["wake-up latency", "compute"]
             .into_iter()
             .enumerate()
             .filter_map(|(i, name)| histogram(name, self.cycles.iter().map(|c| c[i]).collect()))

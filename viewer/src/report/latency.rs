@@ -18,7 +18,7 @@ pub(crate) fn histograms(cycles: &[&CycleRecord]) -> Vec<Histogram> {
         counted.map(|c| f64::from(of(c)) / 1e3).collect()
     };
     [
-        ("late wake-up", us(|c| c.wake_late_ns, false)),
+        ("wake-up latency", us(|c| c.wake_late_ns, false)),
         ("compute", us(|c| c.compute_ns, false)),
         ("wake-up to sent", us(|c| c.send_ns, true)),
     ]

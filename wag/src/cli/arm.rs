@@ -63,8 +63,8 @@ pub struct ArmArgs {
     /// needs no --arm.
     #[arg(long)]
     pub dry_run: bool,
-    /// Use standard input as a dead-man switch, as for every real arm: the arm moves only until
-    /// Enter is pressed or standard input ends.
+    /// Watch standard input, as for every real arm: Enter, any other input that was not asked
+    /// for, or its end stops the arm.
     #[arg(long)]
     pub dead_man: bool,
     /// Use standard input as a hold-to-run control: the arm moves only while Enter is held down

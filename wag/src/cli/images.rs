@@ -3,7 +3,7 @@
 use super::SceneArgs;
 use super::values::{Colour, one_of, rate_hz};
 use camera_ingest::calib::VideoMode;
-use clap::{Args, Subcommand};
+use clap::{ArgGroup, Args, Subcommand};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -82,7 +82,7 @@ pub struct StereoArgs {
     /// Frames per second, for a recording that does not tell its frames' times.
     #[arg(long, value_parser = rate_hz)]
     pub fps: Option<f64>,
-    /// Camera calibration and extrinsics; `wag calib` finds wrong extrinsics.
+    /// Camera calibration and extrinsics; `wag calib check` checks the extrinsics.
     #[arg(long)]
     pub camera: PathBuf,
 }
@@ -122,11 +122,13 @@ pub enum CalibCommand {
 
 /// What the camera is shown.
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("shown").args(["board", "lead"]).required(true)))]
 pub struct ShownArgs {
     #[command(flatten)]
     pub film: StereoArgs,
-    /// Printed ChArUco board that hangs still (board.toml).
-    #[arg(long, conflicts_with_all = ["lead", "lead_rgb"], required_unless_present = "lead")]
+    /// Printed ChArUco board that hangs still (board.toml); a build from source reads it with
+    /// `--features calibration` only.
+    #[arg(long, conflicts_with = "lead_rgb")]
     pub board: Option<PathBuf>,
     /// The arm shows its lead: CSV with columns frame,x,y,z (m, world).
     #[arg(long, requires = "lead_rgb")]

@@ -62,7 +62,11 @@ pub(super) fn host(text: &str) -> Result<IpAddr, String> {
     }
     let found: Vec<IpAddr> = (text, 0u16)
         .to_socket_addrs()
-        .map_err(|e| format!("`{text}` is no address and has none ({e})"))?
+        .map_err(|e| {
+            format!(
+                "cannot resolve `{text}`: it is neither an IP address nor a known host name ({e})"
+            )
+        })?
         .map(|socket| socket.ip())
         .collect();
     let first = found.iter().find(|ip| ip.is_ipv4()).or(found.first());

@@ -137,7 +137,7 @@ fn measure(
 fn rows(cycles: &[Vec<CycleRecord>; 2]) -> Vec<(&'static str, &'static str, [f64; 3])> {
     type Figure = (&'static str, fn(&CycleRecord) -> u32);
     const FIGURES: [Figure; 3] = [
-        ("late wake-up", |c| c.wake_late_ns),
+        ("wake-up latency", |c| c.wake_late_ns),
         ("compute", |c| c.compute_ns),
         ("wake-up to sent", |c| c.send_ns),
     ];

@@ -10,7 +10,7 @@ use shared_types::ipc::message::Percentiles;
 
 /// Time of each with `--quick` (s).
 const QUICK_S: u32 = 5;
-/// Our wake-up error may be this many times that of `cyclictest`.
+/// Our wake-up latency may be this many times that of `cyclictest`.
 const RATIO_MAX: f64 = 1.15;
 /// A cycle computes at most this long, at the 99.9th percentile (us).
 const COMPUTE_MAX_US: f64 = 20.0;
@@ -52,8 +52,8 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
         Err(reason) => (None, Some(reason.to_string())),
     };
     let rows = [
-        ("wake-up error, the loop", Some(wake)),
-        ("wake-up error, cyclictest", cyclictest),
+        ("wake-up latency, the loop", Some(wake)),
+        ("wake-up latency, cyclictest", cyclictest),
         ("receive call", Some(receive)),
         ("compute", Some(compute)),
         ("nothing, for as long", Some(bare)),
@@ -77,7 +77,7 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     let compared = cyclictest.map(|its| compare(&wake, &its));
     if let Some(([p50, p99, p999], within)) = compared {
         println!(
-            "the loop's wake-up error is {p50:.2}, {p99:.2} and {p999:.2} times that of cyclictest ({} at most {RATIO_MAX})",
+            "the loop's wake-up latency is {p50:.2}, {p99:.2} and {p999:.2} times that of cyclictest ({} at most {RATIO_MAX})",
             verdict(within)
         );
     }

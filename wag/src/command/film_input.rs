@@ -69,7 +69,7 @@ impl FilmInput {
     fn of_video(video: &Path, rate_hz: Option<f64>, scene: &SceneArgs) -> anyhow::Result<Self> {
         ensure!(
             scene.part.is_none(),
-            "--part chooses a motion of a run's file, but `{}` is none",
+            "--part chooses a motion of a run's file, but `{}` is not such a file",
             video.display()
         );
         // Before anything is read: what is missing on the command line.
@@ -95,7 +95,7 @@ impl FilmInput {
             (Some(file), _) => load_camera(file)?,
             (None, Some(Ok(camera))) => camera.clone(),
             (None, Some(Err(reason))) => bail!(
-                "the camera in the run's file `{name}` is none: {reason}; name another with --camera"
+                "the camera in the run's file `{name}` cannot be used: {reason}; name another with --camera"
             ),
             (None, None) => {
                 bail!("the run's file `{name}` does not tell its camera: name it with --camera")
@@ -139,7 +139,7 @@ impl SceneArgs {
     pub fn camera(&self) -> anyhow::Result<StereoCamera> {
         let file = self.camera.as_ref();
         let file = file.ok_or_else(|| {
-            anyhow!("name the camera's calibration and place (camera.toml) with --camera")
+            anyhow!("name the camera's calibration and extrinsics (camera.toml) with --camera")
         })?;
         Ok(load_camera(file)?)
     }

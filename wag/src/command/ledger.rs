@@ -65,7 +65,7 @@ fn known(run: &Path) -> Outcome<Entry> {
         return ledger::read(run).or_input();
     }
     Err(bad_input!(
-        "`{}` is no run folder; `wag ledger` lists those of `{RUNS}`",
+        "`{}` is not a run folder; `wag ledger` lists those of `{RUNS}`",
         run.display()
     ))
 }

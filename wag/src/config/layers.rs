@@ -27,7 +27,7 @@ impl Folders {
         let set = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty());
         let rig = match set(RIG_FOLDER).map(PathBuf::from) {
             Some(named) if !named.is_dir() => bail!(
-                "{RIG_FOLDER} names `{}`, which is no folder; correct or unset it",
+                "{RIG_FOLDER} names `{}`, which is not a folder; correct or unset it",
                 named.display()
             ),
             Some(named) => Some(named),

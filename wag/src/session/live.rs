@@ -90,7 +90,7 @@ impl Session {
             "{}; Ctrl-C stops as well",
             match switch {
                 Switch::DeadMan =>
-                    "Standard input is the dead-man switch: whatever nobody asked for lets go",
+                    "Enter stops the arm, and so does any other input that was not asked for, or its end",
                 Switch::HoldToRun => "The arm moves only while Enter is held down",
             }
         );

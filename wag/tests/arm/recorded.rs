@@ -3,8 +3,8 @@
 //! no motion.
 
 use super::support::{
-    Rig, beside_others, command, ended, has, json, process_of, refused_in, said, send,
-    shared_memory_of, until, until_recorded, wag,
+    Rig, alone, command, ended, has, json, process_of, refused_in, said, send, shared_memory_of,
+    until, until_recorded, wag,
 };
 use mcap::{MessageStream, Summary};
 use rustix::process::Signal;
@@ -61,7 +61,7 @@ fn page_has(run: &str, words: &[&str]) {
 
 #[test]
 fn a_whole_run_lies_in_one_file_that_replays_to_the_bit_and_others_may_join() {
-    let _turn = beside_others();
+    let _alone = alone();
     let folder = tempfile::tempdir().unwrap();
     let rig = Rig::start("");
     let path = folder.path().join("run");
@@ -199,7 +199,7 @@ fn ledger_knows(runs: &Path, run: &Path, rig: Rig) {
 
 #[test]
 fn a_stopped_run_is_explained_and_replays_to_the_bit() {
-    let _turn = beside_others();
+    let _alone = alone();
     let folder = tempfile::tempdir().unwrap();
     let faults = folder.path().join("faults.toml");
     let script = "[[fault]]\non = \"setpoint:700\"\nkind = \"raise_error\"\ncode = 31\n";
@@ -246,7 +246,7 @@ fn a_changed_file_is_noticed(run: &Path) {
 
 #[test]
 fn a_killed_recorder_stops_nothing_and_at_most_a_second_is_missing() {
-    let _turn = beside_others();
+    let _alone = alone();
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
     let rig = Rig::start("");

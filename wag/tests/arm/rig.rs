@@ -1,12 +1,13 @@
 //! `wag rig`: one in each domain, which leaves nothing; the vendor's own Python client
 //! against it, by the conformance check that lies beside the checkout.
 
-use super::support::{Rig, beside_others, has, said, shared, shared_memory_of, wag};
+use super::support::{Rig, alone, beside_others, has, said, shared, shared_memory_of, wag};
 use rustix::process::Signal;
 use std::process::Command;
 
 #[test]
 fn a_second_rig_in_a_domain_says_so_and_an_ended_one_leaves_nothing() {
+    let _turn = beside_others();
     let domain = format!("cam{}", std::process::id());
     let filming = format!("--rope random --camera {domain}");
     let mut first = Rig::start(&filming);
@@ -64,7 +65,7 @@ fn python() -> Option<Command> {
 #[test]
 fn two_clients_of_the_vendor_sdk_share_the_simulated_arm() {
     let Some(mut python) = python() else { return };
-    let _turn = beside_others();
+    let _alone = alone();
     let rig = Rig::start("");
     let ports = rig.ports();
     python.args(["-c", TWO_CLIENTS, &ports[0]]);
@@ -79,7 +80,7 @@ fn the_vendor_sdk_accepts_the_simulated_arm() {
         return;
     };
     let Some(mut python) = python() else { return };
-    let _turn = beside_others();
+    let _alone = alone();
     let rig = Rig::start("");
     let ports = rig.ports();
     let reports = ports[2..].join(",");

@@ -97,7 +97,7 @@ pub(crate) const RECORDS: &str = "
     watch --bind 127.0.0.1:99999 => --bind
     watch --bind 192.0.2.7:0 => 192.0.2.7
     watch --seconds nan => --seconds
-    record none => none | no run folder";
+    record none => none | not a run folder";
 
 /// Commands from files to files: films, ropes, plans.
 pub(crate) const ROPES: &str = "

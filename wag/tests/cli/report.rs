@@ -240,8 +240,8 @@ fn what_is_no_run_or_is_damaged_is_refused_by_name() {
         assert!(said.contains(word) && said.lines().count() == 1, "{said}");
         assert!(!run.join("report.html").exists());
     };
-    refused(&dir.path().join("none"), "is no folder");
-    refused(&empty, "no run folder");
+    refused(&dir.path().join("none"), "is not a folder");
+    refused(&empty, "not a run folder");
     for (file, text, word) in [
         ("summary.json", "{", "summary.json"),
         ("run.mcap", "nothing", "run.mcap"),

@@ -3,7 +3,9 @@
 //! the rope in the film.
 
 use super::client::{Watch, read_answer};
-use super::support::{self, Running, alone, calibrate, command, process_of, said, send};
+use super::support::{
+    self, Running, alone, beside_others, calibrate, command, process_of, said, send,
+};
 use camera_ingest::calib::VideoMode;
 use rig_sim::CameraConfig;
 use rig_sim::wiggle_film::{WiggleFilm, joints};
@@ -246,6 +248,7 @@ fn the_rope_is_found_in_a_wiggle_and_followed_whatever_happens_to_the_preview() 
 
 #[test]
 fn a_preview_alone_says_what_it_waits_for_and_needs_a_calibration() {
+    let _turn = beside_others();
     let folder = tempfile::tempdir().unwrap();
     let domain = format!("preview-alone-{}", std::process::id());
     let config = folder.path().join("preview.toml");

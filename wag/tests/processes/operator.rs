@@ -1,7 +1,7 @@
-//! What the operator at the terminal can do: Ctrl-C, and the dead-man switch.
+//! What the operator at the terminal can do: Ctrl-C, and stops by standard input.
 
 use super::shell::{arm, on_arm, recorded};
-use crate::support::{ended, has, refused_in, send, until};
+use crate::support::{beside_others, ended, has, refused_in, send, until};
 use arm_model::response::{Estimate, JointResponse, TrackingLag};
 use arm_model::{ArmResponse, JOINTS};
 use rustix::process::Signal;
@@ -46,6 +46,7 @@ fn was_braked(arm: &SimulatedArm, child: Child, run: &Path, fault: FaultCode) {
 
 #[test]
 fn one_ctrl_c_brakes_the_arm_and_ends_everything() {
+    let _turn = beside_others();
     let folder = tempfile::tempdir().unwrap();
     let (arm, run) = (arm(), folder.path().join("run"));
     let child = on_arm(&arm, "wiggle", &run).spawn().unwrap();
@@ -56,6 +57,7 @@ fn one_ctrl_c_brakes_the_arm_and_ends_everything() {
 
 #[test]
 fn closing_standard_input_lets_go_of_the_dead_man_switch() {
+    let _turn = beside_others();
     let folder = tempfile::tempdir().unwrap();
     let (arm, run) = (arm(), folder.path().join("run"));
     let mut child = on_arm(&arm, "wiggle --dead-man", &run)
@@ -69,6 +71,7 @@ fn closing_standard_input_lets_go_of_the_dead_man_switch() {
 
 #[test]
 fn a_dead_man_switch_that_is_not_held_moves_nothing() {
+    let _turn = beside_others();
     let folder = tempfile::tempdir().unwrap();
     let (arm, run) = (arm(), folder.path().join("run"));
     // Standard input is at its end from the beginning.
@@ -106,6 +109,7 @@ fn rehearsed(run: &Path, word: &str, code: i32) -> String {
 
 #[test]
 fn a_rehearsal_is_confirmed_in_the_start_pose_and_its_record_says_by_whom() {
+    let _turn = beside_others();
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
     rehearsed(&run, "WIGGLE", 0);
@@ -124,6 +128,7 @@ fn a_rehearsal_is_confirmed_in_the_start_pose_and_its_record_says_by_whom() {
 
 #[test]
 fn another_word_in_the_start_pose_moves_nothing() {
+    let _turn = beside_others();
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
     has(&rehearsed(&run, "wiggle", 1), &["not confirmed clear"]);
@@ -134,6 +139,7 @@ fn another_word_in_the_start_pose_moves_nothing() {
 
 #[test]
 fn a_key_that_is_released_brakes_the_arm() {
+    let _turn = beside_others();
     let folder = tempfile::tempdir().unwrap();
     let (arm, run) = (arm(), folder.path().join("run"));
     let mut child = on_arm(&arm, "wiggle --hold-to-run", &run)
@@ -180,6 +186,7 @@ fn response(folder: &Path) -> PathBuf {
 /// the area is clear.
 #[test]
 fn an_arm_behind_a_tunnel_is_measured_and_needs_a_clear_area() {
+    let _turn = beside_others();
     let arm = arm();
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let port = listener.local_addr().unwrap().port();

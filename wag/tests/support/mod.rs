@@ -25,7 +25,7 @@ pub(crate) fn alone() -> RwLockWriteGuard<'static, ()> {
     MACHINE.write().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// For tests that mostly wait for an arm that moves in real time, and judge no time.
+/// For tests that may run beside each other, but not beside one that wants to be alone.
 pub(crate) fn beside_others() -> RwLockReadGuard<'static, ()> {
     MACHINE.read().unwrap_or_else(PoisonError::into_inner)
 }

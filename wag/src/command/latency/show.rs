@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Times within the control loop.
 pub fn loop_table(report: &LatencyReport) -> Table {
     let rows = [
-        ("wake-up late", report.wake),
+        ("wake-up latency", report.wake),
         ("compute", report.compute),
         ("wake-up to sent", report.send),
         ("reply round trip", report.reply),
