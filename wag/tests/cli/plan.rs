@@ -31,7 +31,7 @@ fn a_correction_without_a_miss_or_a_throw_is_refused() {
          plan again run --out p.json => summary.json | --miss
          plan again hidden --out p.json => 0.199 m only | --miss
          plan again gone.json --miss 0,0,0.01 --out p.json => gone.json
-         plan again rope.toml --miss 0,0,0.01 --out p.json => `rope.toml` is no plan
+         plan again rope.toml --miss 0,0,0.01 --out p.json => `rope.toml` is not a plan
          plan again plan.json --miss 0,0.2,0 --out p.json => 20.0 cm
          plan again plan.json --miss 0,0,0.01 --out p.json => other waypoints
          plan again plan.json --miss nan,0,0 --out p.json => finite",
