@@ -39,6 +39,7 @@ pub(crate) const MACHINES: &str = "
     latency --run . => not a run folder | run.mcap
     latency --run . --arm 127.0.0.1 => cannot be used with
     latency --arm 127.0.0.1 --joints 8 => 8
+    latency --arm 127.0.0.1 --response no/r.toml => no/r.toml | folder exists
     latency --arm 127.0.0.1 --excitation unknown.toml => unknown.toml
     latency --dry-run --excitation degrees.toml => degrees.toml | `pose_rad` is 90 | degrees
     process planner --config none.toml => none.toml
