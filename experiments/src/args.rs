@@ -73,6 +73,29 @@ pub enum ResultCommand {
     /// Needs a Python with MuJoCo, named by WAG_MUJOCO_PYTHON. Tune with odd seeds only: even
     /// ones are reserved for judging.
     FullPipeline(MujocoArgs),
+    /// Motion of a real rope, fitted to some recordings of it and predicted for others.
+    ///
+    /// Reads the recordings of a foam cylinder at https://github.com/shamilmamedov/PRB_Net (commit
+    /// a9c478d6, folder dataset/pool-noodle), which are not part of this program: fetch them. Takes
+    /// two to three minutes.
+    RealDlo(RealDloArgs),
+}
+
+/// Arguments of `experiments real-dlo`.
+#[derive(Debug, Args)]
+pub struct RealDloArgs {
+    /// Folder with the recordings: traj1.csv and so on.
+    #[arg(value_name = "DIR")]
+    pub dir: PathBuf,
+    /// Recordings that the rope is fitted to, by number; it is judged on the others.
+    #[arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = [1, 3, 5])]
+    pub fitted: Vec<u32>,
+    /// Threads; the result does not depend on them.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: u16,
+    /// Result file (JSON). A picture of the distances (SVG) is drawn next to it.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// Arguments of results with ropes that MuJoCo simulates.

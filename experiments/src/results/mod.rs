@@ -13,6 +13,7 @@ mod ood;
 mod other_reality;
 mod picture;
 mod pipeline;
+mod real_dlo;
 mod robust;
 mod sensitivity;
 mod sensitivity_map;
@@ -34,6 +35,7 @@ pub fn run(command: &ResultCommand) -> Outcome<Option<Value>> {
     let (name, args, study): (_, &ResultArgs, Study) = match command {
         ResultCommand::OtherReality(args) => return other_reality::run(args),
         ResultCommand::FullPipeline(args) => return other_reality::run_full(args),
+        ResultCommand::RealDlo(args) => return real_dlo::run(args),
         ResultCommand::Sysid(args) => ("sysid", args, sysid::run),
         ResultCommand::MotionFidelity(args) => ("motion-fidelity", args, fidelity::run),
         ResultCommand::SysidOod(args) => ("sysid-ood", args, ood::run),

@@ -20,7 +20,7 @@ const JOINT_MAX_RAD: f64 = 7.5;
 
 /// Reads a CSV whose first columns are those of `header`, all numbers finite
 /// and the first one increasing.
-fn read_table(path: &Path, header: &[&str]) -> Result<Vec<Vec<f64>>> {
+pub fn read_table(path: &Path, header: &[&str]) -> Result<Vec<Vec<f64>>> {
     let name = path.display();
     let file = std::fs::File::open(path).with_context(cannot_read(path))?;
     let mut reader = csv::ReaderBuilder::new()
