@@ -28,6 +28,7 @@ mod clamp_motion;
 mod command_line;
 mod cycle_sample;
 mod cycles;
+mod demo_record;
 mod explanation;
 pub mod files;
 pub mod ledger;
@@ -40,6 +41,7 @@ pub use clamp_motion::ClampMotion;
 pub use command_line::{CommandLine, quoted};
 pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 pub use cycles::{CYCLES_TABLE, Cycles};
+pub use demo_record::{DemoRecord, Film, MotionSpan, Settled, StageTimes, Tracked};
 pub use explanation::{Explanation, Late, LimitExceeded, Row, Stop, explain};
 pub use margins::Margin;
 pub use mcap_file::{

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use arm_model::Cell;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde_json::Value;
+use shared_types::ipc::message::ScoreResult;
 use shared_types::{Plan, RopeParams};
 use std::path::{Path, PathBuf};
 
@@ -127,6 +128,30 @@ impl Run {
         self.file(files::SUMMARY, files::read_json)
     }
 
+    /// The figures of a run that threw.
+    ///
+    /// # Errors
+    /// It has none, or no plan of a throw.
+    pub fn summary_of_throw(&self) -> Result<Value> {
+        let name = self.folder.display();
+        let has_plan = self.plan()?.is_some();
+        let summary = self.summary()?.filter(|s| s.is_object() && has_plan);
+        summary.with_context(|| {
+            format!(
+                "`{name}` is not the folder of a throw: it lacks {} or {}",
+                files::SUMMARY,
+                files::PLAN
+            )
+        })
+    }
+
+    /// Keeps what a camera measured of its throw among its figures, where a demo keeps it.
+    pub fn keep_score(&self, score: &ScoreResult) -> Result<()> {
+        let mut summary = self.summary_of_throw()?;
+        summary["score"] = serde_json::to_value(score)?;
+        files::write_json(&self.folder.join(files::SUMMARY), &summary)
+    }
+
     /// Where the tip passed minus the target (m, base frame), as the run's camera measured it.
     /// One that it hardly knows is refused.
     pub fn miss_m(&self) -> Result<[f64; 3]> {
@@ -137,7 +162,7 @@ impl Run {
         let name = path.display();
         let miss_m = serde_json::from_value(score["miss_m"].clone());
         let miss_m = miss_m.with_context(|| {
-            format!("`{name}` has no miss by the camera (`score.miss_m`): name it with --miss")
+            format!("`{name}` has no miss by the camera (`score.miss_m`): name it with --miss, or measure it with `wag score --run`")
         })?;
         let [low_m, high_m]: [f64; 2] = serde_json::from_value(score["interval_m"].clone())
             .with_context(|| format!("`{name}`: `score.interval_m`"))?;

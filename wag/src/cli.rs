@@ -178,6 +178,12 @@ pub struct DemoArgs {
     /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
     pub accept_unconfirmed: bool,
+    /// Throw at the target of this demo again, with its rope, corrected by the miss that its
+    /// camera measured; again for a third throw, with the run of the second.
+    #[arg(long, value_name = "RUN", conflicts_with_all = [
+        "task", "seed", "target", "rig_config", "accept_unconfirmed",
+    ])]
+    pub again: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]

@@ -10,9 +10,7 @@ use arm_model::{JointVector, Pole};
 use rope_sim::MeasuredArm;
 use shared_types::MonotonicNs;
 use shared_types::ipc::KeypointPublisher;
-use shared_types::ipc::message::{
-    CameraEvent, CameraRequest, CameraRpc, Progress, RopeAppearance, ScoreResult,
-};
+use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, Progress, RopeAppearance};
 use shared_types::ipc::rpc::Call;
 use shared_types::keypoints::KeypointFrame;
 use std::path::Path;
@@ -138,13 +136,7 @@ pub(super) fn score(
     // The first error is reported; a picture is the lesser loss.
     let found = found?;
     drawn?;
-    Ok(CameraEvent::Scored(ScoreResult {
-        closest_m: found.closest_m,
-        interval_m: found.interval_m,
-        miss_m: found.miss_m,
-        time_s: found.time_s,
-        target_m: found.target_m,
-    }))
+    Ok(CameraEvent::Scored((&found).into()))
 }
 
 /// A multiple exposure of the throw up to a little after the closest approach,

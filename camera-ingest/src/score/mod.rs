@@ -18,6 +18,7 @@ use path::{Detection, LocalPath, mark_small};
 use scene::{Scene, Target, blob_error, read_sized};
 use serde::Serialize;
 use shared_types::StereoCamera;
+use shared_types::ipc::message::ScoreResult;
 
 use crate::calib::extrinsics::Correspondence;
 use crate::source::StereoSource;
@@ -38,6 +39,18 @@ pub struct Score {
     pub target_m: [f64; 3],
     /// Smoothed tip centre per frame it was seen in: (s, world m).
     pub tip_path: Vec<(f64, [f64; 3])>,
+}
+
+impl From<&Score> for ScoreResult {
+    fn from(score: &Score) -> Self {
+        Self {
+            closest_m: score.closest_m,
+            interval_m: score.interval_m,
+            miss_m: score.miss_m,
+            time_s: score.time_s,
+            target_m: score.target_m,
+        }
+    }
 }
 
 /// Detections of the tip needed.

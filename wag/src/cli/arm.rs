@@ -1,8 +1,9 @@
 //! The commands that move an arm, the one that simulates it, and those that measure its
 //! control loop.
 
+use super::Point;
 use super::values::host;
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use cli_output::seed;
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -102,9 +103,22 @@ pub struct WiggleArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(group(ArgGroup::new("thrown").args(["plan", "again"]).required(true)))]
 pub struct ThrowArgs {
     /// The plan.
-    pub plan: PathBuf,
+    pub plan: Option<PathBuf>,
+    /// Throw the strike of this run again, changed so that its miss is taken out; the run keeps
+    /// plan and miss (`wag score --run`), or --miss names where the tip passed.
+    #[arg(long, value_name = "RUN")]
+    pub again: Option<PathBuf>,
+    /// Where the tip passed, minus the target: x,y,z in the arm's base frame (m).
+    #[arg(
+        long,
+        allow_hyphen_values = true,
+        requires = "again",
+        conflicts_with = "plan"
+    )]
+    pub miss: Option<Point>,
     /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
     pub accept_unconfirmed: bool,

@@ -97,6 +97,9 @@ pub struct ScoreArgs {
     /// Colour of the target, R,G,B from 0 to 255.
     #[arg(long)]
     pub target_rgb: Colour,
+    /// Folder of the throw's run (`wag throw`): it keeps the miss, for `wag throw --again`.
+    #[arg(long, value_name = "RUN")]
+    pub run: Option<PathBuf>,
 }
 
 /// The camera's extrinsics.

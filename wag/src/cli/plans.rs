@@ -8,7 +8,7 @@ use shared_types::CommandInterface;
 use std::path::PathBuf;
 
 /// What every plan is made with.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub struct PlannerArgs {
     /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
     #[arg(long)]
@@ -64,10 +64,11 @@ pub struct PlanArgs {
 
 #[derive(Debug, Args)]
 pub struct AgainArgs {
-    /// Run folder of a demo, which holds plan and miss; or the plan that was thrown (JSON).
+    /// Run folder of a throw or a demo, which holds plan and miss; or the plan that was thrown
+    /// (JSON).
     pub last: PathBuf,
     /// Where the tip passed, minus the target, as `wag score` prints it: x,y,z in the arm's
-    /// base frame (m). Default: as the run's camera measured it.
+    /// base frame (m). Default: as the run keeps it (`wag score --run`).
     #[arg(long, allow_hyphen_values = true)]
     pub miss: Option<Point>,
     #[command(flatten)]

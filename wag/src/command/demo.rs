@@ -5,8 +5,9 @@ mod rope;
 mod settings;
 mod summary;
 
+use super::plan_again::LastThrow;
 use super::runs::explain_stop;
-use crate::cli::DemoArgs;
+use crate::cli::{DemoArgs, PlannerArgs};
 use crate::config;
 use crate::pipeline::{self, ArmLink, BringUp, RunFolder, execute};
 use crate::session::Session;
@@ -22,16 +23,16 @@ use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rig_sim::RigConfig;
-use run_log::files;
+use run_log::{DemoRecord, Film, files};
 use serde_json::Value;
 use settings::settings;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
 use shared_types::{OperatingMode, Plan, StereoCamera, Task};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
-use summary::{DemoRecord, Film, show};
+use summary::show;
 use viewer::report;
 
 /// Speed of moves between poses, as a part of the fastest move.
@@ -66,20 +67,35 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
             "a demo of the {task} is not implemented in this version; `wag plan {task}` plans and judges one in simulation"
         ));
     }
-    let target_m = args
-        .target
-        .map_or_else(|| random_target(args.seed), |p| p.0);
+    let last = args.again.as_deref().map(LastDemo::read).transpose()?;
+    let rig_config = match &last {
+        Some(last) => Some(&last.rig_config),
+        None => args.rig_config.as_ref(),
+    };
+    let rig: RigConfig = config::here(rig_config.map(PathBuf::as_path)).or_input()?;
+    let seed = last.as_ref().map_or(args.seed, |_| rig.seed);
+    let target_m = match (&last, args.target) {
+        (Some(last), _) => last.throw.plan.target_m,
+        (None, Some(target)) => target.0,
+        (None, None) => random_target(seed),
+    };
     // Refused before anything starts, whatever rope turns out to be there.
-    let rig: RigConfig = config::here(args.rig_config.as_deref()).or_input()?;
     check_reach(target_m, RANGES[1].max, &rig.cell).or_input()?;
     clear_of_arm(target_m, &rig.cell).or_input()?;
     watch_interrupts().or_failed()?;
-    let folder = RunFolder::create(args.out.as_deref(), &format!("demo-{}", args.seed))?;
+    let plan = last.map(|last| last.throw.corrected(&PlannerArgs::default()));
+    let plan = plan.transpose()?;
+    let folder = RunFolder::create(args.out.as_deref(), &format!("demo-{seed}"))?;
     let began = Instant::now();
-    let mut record = DemoRecord::new(args.seed, target_m, &folder);
+    let mut record = DemoRecord::new(seed, target_m, &folder.path);
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    let accept = args.accept_unconfirmed;
-    let result = throw_once(&folder, &mut session, &mut record, &rig, accept);
+    let way = match plan {
+        Some(plan) => Way::Again(Box::new(plan)),
+        None => Way::Whole {
+            accept_unconfirmed: args.accept_unconfirmed,
+        },
+    };
+    let result = throw_once(&folder, &mut session, &mut record, &rig, &way);
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
     let keypoints_kept = session.received.keep_keypoints(&folder.path);
@@ -105,24 +121,65 @@ fn keep_report(run: &Path) {
     }
 }
 
+/// A demo that was made.
+struct LastDemo {
+    throw: LastThrow,
+    /// The rig as it was, seed and all.
+    rig_config: PathBuf,
+}
+
+impl LastDemo {
+    fn read(run: &Path) -> Outcome<Self> {
+        let rig_config = run.join("config").join("rig.toml");
+        if !rig_config.is_file() {
+            return Err(bad_input!(
+                "`{}` is not the folder of a demo: it lacks config/rig.toml",
+                run.display()
+            ));
+        }
+        Ok(Self {
+            throw: LastThrow::read(run, None)?,
+            rig_config,
+        })
+    }
+}
+
+/// How a demo comes to its throw.
+enum Way {
+    /// By the film of a wiggle.
+    Whole { accept_unconfirmed: bool },
+    /// By a plan that corrects a throw at the same rig.
+    Again(Box<Plan>),
+}
+
 /// The whole throw; each line hands the next what it found.
 fn throw_once(
     folder: &RunFolder,
     session: &mut Session,
     record: &mut DemoRecord,
     rig: &RigConfig,
-    accept_unconfirmed: bool,
+    way: &Way,
 ) -> anyhow::Result<()> {
     let settings = settings(config::here(None)?, record.seed);
     let rig_config = pipeline::rig_config(folder, rig, record.seed, record.target_m);
     let mut demo = Demo::start(folder, session, record, settings, &rig_config)?;
-    let motion = wiggle(&demo.settings.wiggle, &demo.limits)?;
-    demo.bring_up(&motion)?;
-    let film = demo.wiggle(&motion)?;
-    let tracked = demo.track(&film, accept_unconfirmed)?;
-    let rope = demo.identify(&film, tracked)?;
-    let plan = demo.plan(&rope)?;
-    demo.settle(&rope, &film, &motion, &plan)?;
+    let plan = match way {
+        Way::Again(plan) => {
+            demo.keep_plan(plan)?;
+            demo.bring_up(&plan.trajectory)?;
+            (**plan).clone()
+        }
+        Way::Whole { accept_unconfirmed } => {
+            let motion = wiggle(&demo.settings.wiggle, &demo.limits)?;
+            demo.bring_up(&motion)?;
+            let film = demo.wiggle(&motion)?;
+            let tracked = demo.track(&film, *accept_unconfirmed)?;
+            let rope = demo.identify(&film, tracked)?;
+            let plan = demo.plan(&rope)?;
+            demo.settle(&rope, &film, &motion, &plan)?;
+            plan
+        }
+    };
     let throw = demo.throw(&plan)?;
     demo.score(&rig_config);
     demo.compare_with_truth(&throw)
@@ -222,13 +279,13 @@ impl<'a> Demo<'a> {
     }
 
     /// Enables the arm, moves to the start pose, waits for the rope.
-    fn bring_up(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<()> {
+    fn bring_up(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
         let stage = Stage::begin("bring-up");
         let mut found = BringUp::default();
         pipeline::acquire(self.session, &self.arm, &mut found)?;
         self.record.warnings = found.warnings;
         pipeline::arm_for(self.session, &self.arm, OperatingMode::SetUp, None)?;
-        pipeline::move_to(self.session, &self.arm, wiggle.start(), MOVE_SPEED)?;
+        pipeline::move_to(self.session, &self.arm, motion.start(), MOVE_SPEED)?;
         let still = self.wait_still(&stage)?;
         self.record.stages.bringup_s = stage.done(if still {
             "arm enabled and armed (simulated: no confirmation needed), rope hangs still"
@@ -300,6 +357,7 @@ impl<'a> Demo<'a> {
         // Empties the histograms, so that they hold this throw alone.
         pipeline::latency(self.session, &self.arm)?;
         let film = self.film(THROW_FRAMES, &plan.trajectory, true, &stage)?;
+        self.record.set_throw(film);
         self.record.latency = Some(pipeline::latency(self.session, &self.arm)?);
         self.record.stages.throw_s =
             stage.done(&format!("{} frames, {} dropped", film.frames, film.dropped));

@@ -3,20 +3,23 @@
 use super::area::{asks, limits, reach_measured, require_clear_area};
 use super::dry_run;
 use super::on_arm::{AT_START, on_arm};
-use super::plan::LOOK;
+use super::plan::{LOOK, tell};
+use super::plan_again::LastThrow;
 use super::unconfirmed::confirm;
-use crate::cli::{ArmArgs, ThrowArgs};
+use crate::cli::{ArmArgs, PlannerArgs, ThrowArgs};
 use crate::config;
 use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
 use crate::session::Session;
 use arm_model::{JOINTS, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
+use planner::plan::{Shortcoming, shortcoming};
 use rt_controller::armed_speed::ArmedSpeed;
 use rt_controller::control::{Motion, OperatingModeSpeeds};
 use rt_controller::os::now_ns;
-use run_log::files::read_plan;
+use run_log::Cycles;
+use run_log::files::{self, read_plan};
 use serde_json::{Value, json};
-use shared_types::OperatingMode;
+use shared_types::{OperatingMode, Plan};
 use std::path::Path;
 
 /// Refuses a motion of a real arm in joints of which nobody knows how they follow.
@@ -51,16 +54,21 @@ fn require_measured_joints(
 /// Joints that move by less stand still to the controller's monitors (rad).
 const STILL_RAD: f64 = 0.02;
 
-/// Moves to a trajectory's start and streams it, armed for `operating_mode`; returns what was
-/// measured. Without an `address` it must be a dry run.
+/// Moves to a trajectory's start and streams it, armed for the throw of a `plan` or for a wiggle;
+/// returns what was measured. Without an `address` it must be a dry run.
 pub fn drive(
     arm: &ArmArgs,
     address: Option<ArmAddress>,
     limits: &Limits,
     trajectory: &JointTrajectory,
     out: Option<&Path>,
-    operating_mode: OperatingMode,
+    // The throw's, which the run keeps.
+    plan: Option<&Plan>,
 ) -> Outcome<Option<Value>> {
+    let operating_mode = match plan {
+        Some(_) => OperatingMode::Throw,
+        None => OperatingMode::Wiggle,
+    };
     let (name, word) = match operating_mode {
         OperatingMode::Throw => ("throw", "THROW"),
         OperatingMode::Wiggle | OperatingMode::SetUp => ("wiggle", "WIGGLE"),
@@ -113,15 +121,41 @@ pub fn drive(
         }))
     };
     let place = (out, name);
-    let (folder, value) = on_arm(arm, address, limits, start, place, work, |_, _, value| {
+    let keep = |folder: &Path, _: Cycles, value| {
+        plan.map_or(Ok(()), |plan| {
+            files::write_json(&folder.join(files::PLAN), plan)
+        })?;
         Ok(value)
-    })?;
+    };
+    let (folder, value) = on_arm(arm, address, limits, start, place, work, keep)?;
     println!("done; run folder: {}", folder.display());
     Ok(Some(value))
 }
 
+/// The plan that is named, or the one that takes out the miss of the run that is.
+fn plan_of(args: &ThrowArgs) -> Outcome<Plan> {
+    let (Some(run), arm) = (&args.again, &args.arm) else {
+        let path = args.plan.as_deref().unwrap_or(Path::new(""));
+        return read_plan(path).or_input();
+    };
+    let last = LastThrow::read(run, args.miss)?;
+    let is_followed = last.plan.arm_response.is_some();
+    let plan = last.corrected(&PlannerArgs {
+        limits: arm.limits.clone(),
+        config: None,
+        arm_response: arm.arm_response.clone().filter(|_| is_followed),
+    })?;
+    tell(&plan);
+    match shortcoming(&plan) {
+        Some(Shortcoming { message, is_severe }) if is_severe => {
+            Err(failed!("{message}: plan anew"))
+        }
+        _ => Ok(plan),
+    }
+}
+
 pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
-    let plan = read_plan(&args.plan).or_input()?;
+    let plan = plan_of(args)?;
     confirm(&plan.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
     config::cell_for(&plan).or_input()?;
     let address = reach_measured(&args.arm)?;
@@ -135,9 +169,9 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
         &limits,
         &plan.trajectory,
         args.out.as_deref(),
-        OperatingMode::Throw,
+        Some(&plan),
     )?;
     Ok(Some(
-        json!({ "ok": true, "command": "throw", "plan": args.plan, "run": run }),
+        json!({ "ok": true, "command": "throw", "plan": args.plan, "again": args.again, "run": run }),
     ))
 }

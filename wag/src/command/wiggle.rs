@@ -10,7 +10,6 @@ use planner::PlannerConfig;
 use planner::wiggle::wiggle;
 use run_log::files;
 use serde_json::{Value, json};
-use shared_types::OperatingMode;
 
 pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
     if args.evaluate || args.optimise {
@@ -43,7 +42,7 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
             &limits,
             &trajectory,
             args.out.as_deref(),
-            OperatingMode::Wiggle,
+            None,
         )?
     } else {
         None

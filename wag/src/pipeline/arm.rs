@@ -4,6 +4,7 @@ use crate::session::Session;
 use anyhow::{anyhow, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use rt_controller::os::now_ns;
+use run_log::MotionSpan;
 use shared_types::OperatingMode;
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{
@@ -16,15 +17,6 @@ use shared_types::plan::trajectory_hash;
 const MOVED_WITHIN_S: f64 = 600.0;
 
 pub type ArmLink = RpcClient<ControllerRpc>;
-
-/// When a motion ran (CLOCK_MONOTONIC, ns).
-#[derive(Debug, Clone, Copy, Default)]
-pub struct MotionSpan {
-    /// Deadline of the first setpoint.
-    pub start_ns: u64,
-    /// Deadline of the last setpoint.
-    pub end_ns: u64,
-}
 
 /// The error of an event that ends a request badly.
 fn refusal(what: &str, event: &ControllerEvent) -> anyhow::Error {

@@ -7,8 +7,7 @@ mod run_folder;
 mod service;
 
 pub use arm::{
-    ArmLink, BringUp, MotionSpan, acquire, arm_for, arm_simulated, enable, execute, latency,
-    move_to,
+    ArmLink, BringUp, acquire, arm_for, arm_simulated, enable, execute, latency, move_to,
 };
 pub use processes::{ArmAddress, controller, rig_config, start, start_recorder, start_rig};
 pub use run_folder::RunFolder;

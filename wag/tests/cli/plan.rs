@@ -34,7 +34,11 @@ fn a_correction_without_a_miss_or_a_throw_is_refused() {
          plan again rope.toml --miss 0,0,0.01 --out p.json => `rope.toml` is not a plan
          plan again plan.json --miss 0,0.2,0 --out p.json => 20.0 cm
          plan again plan.json --miss 0,0,0.01 --out p.json => other waypoints
-         plan again plan.json --miss nan,0,0 --out p.json => finite",
+         plan again plan.json --miss nan,0,0 --out p.json => finite
+         throw --again plan.json --arm 127.0.0.1 => --miss
+         throw --again run --arm 127.0.0.1 => summary.json | wag score --run
+         throw --again plan.json --miss 0,0.3,0 --arm 127.0.0.1 => 30.0 cm is too far
+         demo --again run => run | config/rig.toml",
     );
     assert!(!dir.path().join("p.json").exists());
 }

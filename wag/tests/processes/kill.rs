@@ -5,7 +5,9 @@ use crate::support::{alone, command, json_in, process_of, processes_of, said, se
 use arm_model::Limits;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use run_log::Run;
 use rustix::process::Signal;
+use shared_types::ipc::message::ScoreResult;
 use std::path::Path;
 use std::process::Child;
 use std::thread::sleep;
@@ -104,10 +106,37 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
         again["predicted_error_m"].as_f64().unwrap() < 1e-3,
         "{again}"
     );
-    let corrected = run_log::files::read_plan(&folder.path().join("again.json")).unwrap();
+    let plan_in = |name: &str| run_log::files::read_plan(&folder.path().join(name)).unwrap();
+    let corrected = plan_in("again.json");
     assert!(
         Limits::default()
             .worst_violation(&corrected.trajectory)
             .is_none()
     );
+
+    // An arm alone would make it, and the same rig does.
+    let dry = json_in(folder.path(), "throw --again after --dry-run");
+    assert_eq!(dry["ok"], true, "{dry}");
+    let second = json_in(folder.path(), "demo --again after --out second");
+    assert_eq!(second["seed"], 1, "{second}");
+    assert_eq!(second["target_m"], reported["target_m"]);
+    assert_eq!(second["truth"]["rope"], reported["truth"]["rope"]);
+    assert_eq!(plan_in("second/plan.json").trajectory, corrected.trajectory);
+    let distance_m = second["true_tip_target_distance_m"].as_f64().unwrap();
+    assert!(distance_m < 0.15, "{second:#}");
+    assert!(second["epoch_ns"].as_u64().unwrap() > 0);
+    // What a camera beside it measured takes the place of what its own did.
+    let scored = ScoreResult {
+        closest_m: 0.03,
+        interval_m: [0.02, 0.04],
+        miss_m: [0.01, -0.02, 0.02],
+        time_s: 0.9,
+        target_m: [0.0; 3],
+    };
+    let run = Run::open(&folder.path().join("second")).unwrap();
+    run.keep_score(&scored).unwrap();
+    assert_eq!(run.summary().unwrap().unwrap()["seed"], 1, "the rest stays");
+    let third = json_in(folder.path(), "plan again second --out third.json");
+    assert_eq!(third["miss_m"], serde_json::json!(scored.miss_m), "{third}");
+    assert_eq!(third["aim"]["corrections"], 2, "{third}");
 }

@@ -2,7 +2,6 @@
 //! that brings it to rest.
 
 use super::Demo;
-use super::summary::{Film, Settled, Tracked};
 use crate::command::network::warning_of_pole;
 use crate::command::plan::describe;
 use crate::command::unconfirmed::confirm;
@@ -14,7 +13,7 @@ use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, warnings};
 use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
 use planner::settle::SettleRequest;
 use rt_controller::os::now_ns;
-use run_log::files;
+use run_log::{Film, Settled, Tracked, files};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, RopeAppearance};
 use shared_types::{MonotonicNs, OperatingMode, Plan, RopeEstimate, Task};
 use std::time::Duration;
@@ -172,15 +171,21 @@ impl Demo<'_> {
             PlannerEvent::Planned(plan) => *plan,
             other => bail!("the planner process answered with {other:?}"),
         };
-        files::write_json(&self.folder.file(files::PLAN), &plan)?;
+        self.record.stages.plan_s = stage.done(&describe(&plan));
+        self.keep_plan(&plan)?;
+        Ok(plan)
+    }
+
+    /// Keeps a plan in the run's folder, and says what is poor about it.
+    pub fn keep_plan(&mut self, plan: &Plan) -> anyhow::Result<()> {
+        files::write_json(&self.folder.file(files::PLAN), plan)?;
         let csv = self.folder.file("plan.csv");
         files::write_trajectory(&csv, &plan.trajectory, self.limits.period_s())?;
-        self.record.stages.plan_s = stage.done(&describe(&plan));
-        for warning in warnings(&plan) {
+        for warning in warnings(plan) {
             self.warn(&warning);
         }
-        self.record.set_plan(&plan);
-        Ok(plan)
+        self.record.set_plan(plan);
+        Ok(())
     }
 
     /// Turns towards the target so that the rope comes to rest: by a move planned with the

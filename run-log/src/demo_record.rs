@@ -1,0 +1,212 @@
+//! What a demo keeps of itself: every stage's figures, and the truth apart.
+
+use anyhow::bail;
+use serde::Serialize;
+use serde_json::{Value, json};
+use shared_types::ipc::message::{LatencyReport, RigEvent, RopeAppearance, ScoreResult};
+use shared_types::{Plan, RopeEstimate, RopeParams};
+use std::path::Path;
+
+/// When a motion ran (CLOCK_MONOTONIC, ns).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MotionSpan {
+    /// Deadline of the first setpoint.
+    pub start_ns: u64,
+    /// Deadline of the last setpoint.
+    pub end_ns: u64,
+}
+
+/// Wall time of each stage (s).
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct StageTimes {
+    /// Starting the processes.
+    pub start_s: f64,
+    /// Enabling the arm and moving to the start.
+    pub bringup_s: f64,
+    /// The wiggle.
+    pub wiggle_s: f64,
+    /// Tracking.
+    pub track_s: f64,
+    /// Identification.
+    pub identify_s: f64,
+    /// Planning.
+    pub plan_s: f64,
+    /// Bringing the rope to rest.
+    pub settle_s: f64,
+    /// The throw.
+    pub throw_s: f64,
+    /// Measuring the miss.
+    pub score_s: f64,
+}
+
+/// A film and its motion.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Film {
+    /// Start of exposure of the first frame (CLOCK_MONOTONIC, ns).
+    pub first_stamp_ns: u64,
+    /// Frames kept.
+    pub frames: u32,
+    /// Frames the camera dropped.
+    pub dropped: u32,
+    /// When the motion ran.
+    #[serde(skip)]
+    pub motion: MotionSpan,
+}
+
+/// How a film was tracked.
+#[derive(Debug, Clone, Serialize)]
+pub struct Tracked {
+    /// Part of the frames in which the rope was lost (0 to 1).
+    pub lost_fraction: f64,
+    /// Sizes of rope and lead.
+    #[serde(flatten)]
+    pub appearance: RopeAppearance,
+    /// Processing time per frame (ms).
+    pub ms_per_frame: f64,
+    /// Why the track should not be relied on.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unconfirmed: Vec<String>,
+}
+
+/// A move that brings the rope to rest.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Settled {
+    /// Simulated residual vibration of the tip after a plain move (m).
+    pub plain_residual_m: f64,
+    /// The same after the move that was made (m).
+    pub residual_m: f64,
+    /// How much later than planned the move began (s).
+    pub late_s: f64,
+}
+
+/// Everything a demo reports; `summary.json` and `--json`.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct DemoRecord {
+    /// Whether the throw went through.
+    pub ok: bool,
+    command: &'static str,
+    version: &'static str,
+    /// Seed of the hidden rope, the target, the noise and every search.
+    pub seed: u64,
+    /// The run's folder.
+    pub run: String,
+    task: &'static str,
+    /// Target in the arm's base frame (m).
+    pub target_m: [f64; 3],
+    /// What went wrong.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+    /// Distance of tip and target by the rig's truth (m).
+    pub true_tip_target_distance_m: Option<f64>,
+    /// Distance the planner predicted (m).
+    pub planned_tip_target_distance_m: Option<f64>,
+    /// Distance measured by the stereo camera (m).
+    stereo_tip_target_distance_m: Option<f64>,
+    /// Instant that times in the run's files count from (CLOCK_MONOTONIC, ns): the
+    /// wiggle's first frame.
+    epoch_ns: u64,
+    /// Wall time of the whole demo (s).
+    pub wall_s: f64,
+    /// Wall time of each stage.
+    pub stages: StageTimes,
+    wiggle: Option<Film>,
+    /// How the rope was tracked through the wiggle.
+    pub track: Option<Tracked>,
+    /// The rope.
+    pub identified: Option<RopeEstimate>,
+    plan: Option<Value>,
+    /// How it was brought to rest.
+    pub settle: Option<Settled>,
+    /// How late the arm follows its setpoints, from the wiggle (s).
+    pub arm_lag_s: Option<f64>,
+    /// The throw as the camera measured it.
+    pub score: Option<ScoreResult>,
+    /// Why it could not.
+    pub score_failed: Option<String>,
+    /// Latency of the control loop during the throw.
+    pub latency: Option<LatencyReport>,
+    /// What the real-time set-up could not get, and what is poor about the plan.
+    pub warnings: Vec<String>,
+    truth: Option<Value>,
+    /// The rope as it is.
+    #[serde(skip)]
+    pub true_rope: Option<RopeParams>,
+}
+
+impl DemoRecord {
+    /// Nothing yet, of a run in this folder.
+    #[must_use]
+    pub fn new(seed: u64, target_m: [f64; 3], folder: &Path) -> Self {
+        Self {
+            command: "demo",
+            version: shared_types::VERSION,
+            seed,
+            run: folder.display().to_string(),
+            task: "strike",
+            target_m,
+            ..Self::default()
+        }
+    }
+
+    /// Keeps the film of the wiggle, from whose first frame times count.
+    pub fn set_wiggle(&mut self, film: Film) {
+        self.epoch_ns = film.first_stamp_ns;
+        self.wiggle = Some(film);
+    }
+
+    /// Times count from the film of the throw where there was no wiggle.
+    pub fn set_throw(&mut self, film: Film) {
+        if self.wiggle.is_none() {
+            self.epoch_ns = film.first_stamp_ns;
+        }
+    }
+
+    /// Keeps what the plan promises.
+    pub fn set_plan(&mut self, plan: &Plan) {
+        self.planned_tip_target_distance_m = Some(plan.predicted_error_m);
+        self.plan = Some(json!({
+            "predicted_error_m": plan.predicted_error_m, "predicted_time_s": plan.predicted_time_s,
+            "simulations": plan.simulations, "resampled": plan.resampled,
+            "forecast": plan.forecast, "trajectory_sha256": plan.trajectory_sha256,
+        }));
+    }
+
+    /// Keeps what the camera measured, or why it could not.
+    pub fn set_score(&mut self, score: anyhow::Result<ScoreResult>) {
+        match score {
+            Ok(score) => {
+                self.stereo_tip_target_distance_m = Some(score.closest_m);
+                self.score = Some(score);
+            }
+            Err(e) => self.score_failed = Some(format!("{e:#}")),
+        }
+    }
+
+    /// Keeps the truth, known only because the rig is simulated; the throw is complete
+    /// with it.
+    ///
+    /// # Errors
+    /// The rig failed.
+    pub fn set_truth(&mut self, truth: RigEvent) -> anyhow::Result<()> {
+        match truth {
+            RigEvent::Truth {
+                rope,
+                closest_m,
+                peak_tip_speed_m_s,
+                touched,
+                ..
+            } => {
+                self.true_tip_target_distance_m = Some(closest_m);
+                self.true_rope = Some(rope);
+                self.truth = Some(json!({
+                    "rope": rope, "closest_m": closest_m, "peak_tip_speed_m_s": peak_tip_speed_m_s,
+                    "rope_touched_robot": touched,
+                }));
+                self.ok = true;
+                Ok(())
+            }
+            RigEvent::Failed { message } => bail!(message),
+            other => bail!("the rig answered with {other:?}"),
+        }
+    }
+}
