@@ -160,7 +160,7 @@ impl Run {
         let score = self.summary()?.unwrap_or_default()["score"].take();
         let path = self.folder.join(files::SUMMARY);
         let name = path.display();
-        let miss_m = serde_json::from_value(score["miss_m"].clone());
+        let miss_m = serde_json::from_value(score["miss_m"].clone()).ok();
         let miss_m = miss_m.with_context(|| {
             format!("`{name}` has no miss by the camera (`score.miss_m`): name it with --miss, or measure it with `wag score --run`")
         })?;

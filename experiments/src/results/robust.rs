@@ -62,9 +62,11 @@ impl RobustTrial {
                 FORECAST,
                 seed,
             );
-            // These ropes are thrown in the very model that they are planned with.
+            // These ropes are thrown in the very model that they are planned with, by an arm
+            // whose joints have no errors.
             let drawn = PosteriorEnsemble {
                 discrepancy_m: 0.0,
+                joint_zero_std_rad: 0.0,
                 ..drawn
             };
             let planned = thrower.plan_for(&found.params, SEARCHES, drawn)?;

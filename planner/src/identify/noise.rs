@@ -108,13 +108,17 @@ fn subtract(
     }
 }
 
-/// The noise that residuals show in one axis.
+/// The noise that residuals show in one axis. Its size is that of a detection with weight 1; its
+/// correlations are of residuals as they are, because weights that change would look like motion.
 fn estimate_axis(grid: &Grid, rows: &Rows, axis: usize) -> KeypointNoise {
+    // Divided by what is expected of its weight, and the weight.
     let residual = |i: usize| {
         let (row, cell) = (rows[i].as_ref()?, grid.cells[i]?);
-        Some(cell.weight.sqrt() * row[axis][RESIDUAL])
+        Some((cell.weight.sqrt() * row[axis][RESIDUAL], cell.weight))
     };
-    let mut sizes: Vec<f64> = (0..rows.len()).filter_map(residual).map(f64::abs).collect();
+    let mut sizes: Vec<f64> = (0..rows.len())
+        .filter_map(|i| Some(residual(i)?.0.abs()))
+        .collect();
     if sizes.is_empty() {
         return Noise::white(1.0).axes[axis];
     }
@@ -122,18 +126,25 @@ fn estimate_axis(grid: &Grid, rows: &Rows, axis: usize) -> KeypointNoise {
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
     // The median of a normal variable's size is 0.6745 deviations.
     let limit = CLIP * (*median / 0.6745).max(SIGMA_MIN_PX);
-    let clipped = |i: usize| residual(i).map(|r| r.clamp(-limit, limit));
-    let squares: f64 = (0..rows.len()).filter_map(clipped).map(|r| r * r).sum();
+    let clipped = |i: usize| residual(i).map(|(r, weight)| (r.clamp(-limit, limit), weight));
+    let squares: f64 = (0..rows.len())
+        .filter_map(clipped)
+        .map(|(r, _)| r * r)
+        .sum();
     let sigma = (squares / sizes.len() as f64).sqrt();
     let k = grid.keypoints;
     let lag = |step: usize, linked: &dyn Fn(usize) -> bool| {
         let (mut products, mut squares) = (0.0, 0.0);
         for i in step..rows.len() {
             if linked(i)
-                && let (Some(a), Some(b)) = (clipped(i), clipped(i - step))
+                && let (Some((a, weight_a)), Some((b, weight_b))) = (clipped(i), clipped(i - step))
+                && weight_a > 0.0
+                && weight_b > 0.0
             {
-                products += a * b;
-                squares += f64::midpoint(a * a, b * b);
+                let (a, b) = (a / weight_a.sqrt(), b / weight_b.sqrt());
+                let weight = weight_a.min(weight_b);
+                products += weight * a * b;
+                squares += weight * f64::midpoint(a * a, b * b);
             }
         }
         if squares > 0.0 {
@@ -154,24 +165,29 @@ mod tests {
     use super::super::film::Detection;
     use super::*;
 
+    /// One keypoint in as many frames as there are weights.
+    fn grid(weights: &[f64]) -> Grid {
+        let cell = |weight: &f64| {
+            Some(Detection {
+                time_s: 0.0,
+                along: 0.5,
+                pixel: [0.0; 2],
+                weight: *weight,
+            })
+        };
+        Grid {
+            keypoints: 1,
+            cells: weights.iter().map(cell).collect(),
+            follows: (0..weights.len()).map(|i| i > 0).collect(),
+        }
+    }
+
     /// A displacement that lasts is no motion, whatever the tracker's confidence does meanwhile.
     #[test]
     fn confidence_that_comes_and_goes_does_not_look_like_motion() {
         const FRAMES: usize = 6;
         let weights = [0.98, 0.5, 0.98, 0.92, 0.98, 0.6];
-        let cell = |weight| {
-            Some(Detection {
-                time_s: 0.0,
-                along: 0.5,
-                pixel: [0.0; 2],
-                weight,
-            })
-        };
-        let grid = Grid {
-            keypoints: 1,
-            cells: weights.map(cell).to_vec(),
-            follows: (0..FRAMES).map(|i| i > 0).collect(),
-        };
+        let grid = grid(&weights);
         let mut row = [0.0; FREE + 1];
         row[RESIDUAL] = 0.3;
         let mut rows: Rows = vec![Some([row; 2]); FRAMES];
@@ -186,6 +202,30 @@ mod tests {
             let expected = alone * weights[i].min(weights[i - 1]).sqrt();
             assert!((row.unwrap()[0][RESIDUAL] - expected).abs() < 1e-12, "{i}");
         }
+    }
+
+    /// Nor does it lower the correlation of what lasts.
+    #[test]
+    fn what_lasts_is_correlated_whatever_its_confidence() {
+        let steady = grid(&[0.9; 400]);
+        let coming_and_going: Vec<f64> = (0..400)
+            .map(|i| if i % 3 == 0 { 0.09 } else { 0.9 })
+            .collect();
+        let mut row = [0.0; FREE + 1];
+        let rows: Rows = (0..400)
+            .map(|i| {
+                row[RESIDUAL] = 0.3 * (f64::from(i) * 0.05).sin();
+                Some([row; 2])
+            })
+            .collect();
+        let of = |grid: &Grid| Noise::estimate(grid, &rows).axes[0];
+        let (steady, changing) = (of(&steady), of(&grid(&coming_and_going)));
+        assert!(steady.in_time > 0.96, "{steady:?}");
+        assert!(
+            (changing.in_time - steady.in_time).abs() < 0.01,
+            "{changing:?}"
+        );
+        assert!(changing.sigma_px < steady.sigma_px);
     }
 
     #[test]
