@@ -106,6 +106,20 @@ pub struct MujocoArgs {
     /// Links in MuJoCo for each of the rope's own; bending stiffness and damping stay.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=4))]
     pub refinement: u32,
+    /// Plan for this many ropes drawn from the posterior, as `wag plan --robust`; 0 plans for the
+    /// most likely rope alone.
+    #[arg(long, default_value_t = 0, value_name = "K")]
+    pub robust: usize,
+}
+
+impl MujocoArgs {
+    /// What distinguishes trials made with these from others, beside seed and method.
+    pub fn remark(&self) -> String {
+        let Self {
+            refinement, robust, ..
+        } = self;
+        format!(", refined {refinement} times, robust over {robust} ropes")
+    }
 }
 
 /// Arguments of `experiments other-reality`.

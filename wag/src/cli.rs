@@ -217,6 +217,9 @@ pub struct SimRopeArgs {
     /// Rotation vector of joint 0 at the start (rad), x,y,z.
     #[arg(long, allow_hyphen_values = true, default_value = "0,0,0")]
     pub initial_joint0: Point,
+    /// Start hanging at rest below the first pose instead of straight.
+    #[arg(long, conflicts_with = "initial_joint0")]
+    pub hanging: bool,
     /// Node positions, float64 .npy of shape (frames, links+1, 3).
     #[arg(long)]
     pub out: PathBuf,

@@ -10,7 +10,7 @@ use super::budget::Budget;
 use super::coordinates::{
     CLAMP, Coordinates, FRICTION, LINKS, Point, SLIP, link_range, middle_links, nearest_links,
 };
-use super::descent::{DescentRules, best, descend};
+use super::descent::{DescentRules, best, descend, go_on};
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
 use super::linear::influence;
@@ -21,7 +21,8 @@ use super::refine::{Refined, SETTLED, refine};
 const STARTS: [(f64, f64); 3] = [(0.02, -0.7), (0.3, -1.2), (0.5, 0.3)];
 /// Steps of each start before the best is chosen.
 const CHOICE_STEPS: usize = 3;
-/// Gain of the best start below which the fit is not made.
+/// Gain of the best start, promised by its slopes and then reached, below which the fit is not
+/// made.
 const PROMISE_MIN: f64 = 6.0;
 /// Deviation of what a tracker's keypoint is off by all through a film (px).
 const OFFSET_STD_PX: f64 = 0.3;
@@ -46,24 +47,41 @@ pub(super) fn beyond(
         x
     };
     let noise_px = plain.at.distance_px / 2.0_f64.sqrt();
-    let rules = DescentRules {
+    let rules = |iterations: usize| DescentRules {
         fidelity: Fidelity::Fine,
         links: middle_links(),
         noise: plain.noise,
-        iterations: CHOICE_STEPS,
+        iterations,
         settled_below: SETTLED,
     };
     let starts = STARTS.map(start);
-    let chosen = best(descend(film, &coordinates, &starts, &[], &rules, budget)?)?;
     // A plain fit says nothing about a slip or a clamp that could be likely or not.
     let mut without = plain.x;
     for i in [SLIP, CLAMP] {
         without[i] = coordinates.prior_mean[i];
     }
     let plain_cost = plain.at.normal(film, Fidelity::Fine, &plain.noise);
-    let promise = plain_cost.total_cost(&coordinates, &without) - chosen.cost;
+    let plain_cost = plain_cost.total_cost(&coordinates, &without);
+    let begun = descend(film, &coordinates, &starts, &[], &rules(0), budget)?;
+    let promised = begun.iter().map(|w| w.promised_cost(&coordinates));
+    let promise = plain_cost - promised.fold(f64::INFINITY, f64::min);
     if promise < PROMISE_MIN {
         tracing::debug!(promise, "nothing beyond the nine parameters");
+        return Ok(plain);
+    }
+    let chosen = best(go_on(
+        film,
+        &coordinates,
+        begun,
+        &rules(CHOICE_STEPS),
+        budget,
+    )?)?;
+    let promise = plain_cost - chosen.cost;
+    if promise < PROMISE_MIN {
+        tracing::debug!(
+            promise,
+            "nothing beyond the nine parameters after some steps"
+        );
         return Ok(plain);
     }
     let found = refine(film, &coordinates, &chosen.x, noise_px, budget)?;

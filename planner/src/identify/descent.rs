@@ -133,6 +133,15 @@ impl Iterate {
         }
     }
 
+    /// The cost that an undamped step leads to if everything is linear; less than any real step
+    /// reaches, but for a curve that happens to help.
+    pub(super) fn promised_cost(&self, coordinates: &Coordinates) -> f64 {
+        let normal = self.normal.information + coordinates.prior_information();
+        let gradient = self.normal.gradient + coordinates.prior_gradient(&self.x);
+        let step = normal.cholesky().map(|factors| factors.solve(&gradient));
+        step.map_or(self.cost, |step| self.cost - 0.5 * step.dot(&gradient))
+    }
+
     /// The point a damped step leads to; `None` if there is no step.
     fn trial(&mut self, coordinates: &Coordinates) -> Option<Point> {
         let normal = self.normal.information + coordinates.prior_information();

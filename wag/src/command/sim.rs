@@ -82,8 +82,13 @@ pub fn rope(args: &SimRopeArgs) -> Outcome<Option<Value>> {
     let motion = PoseTrack::new(&rows)
         .with_context(|| format!("`{}`", args.pose.display()))
         .or_input()?;
-    let start = Start::Straight {
+    let straight = Start::Straight {
         joint0_rotvec: args.initial_joint0.0,
+    };
+    let start = if args.hanging {
+        Start::Equilibrium
+    } else {
+        straight
     };
     let options = SimOptions {
         precision: args.precision,

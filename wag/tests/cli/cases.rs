@@ -112,6 +112,7 @@ pub(crate) const ROPES: &str = "
     calib => Usage | extrinsics
     sim rope --rope rope.toml --pose pose.csv --fps -60 --out o.npy => --fps
     sim rope --rope rope.toml --pose pose.csv --fps 60 --dt 0 --out o.npy => --dt
+    sim rope --rope rope.toml --pose pose.csv --fps 60 --hanging --initial-joint0 0,0,0 --out o.npy => cannot be used with
     sim rope --rope rope.toml --pose pose.csv --fps 60 --out no/o.npy => no/o.npy
     sim throw --rope rope.toml --joints pose.csv --out o.csv => pose.csv | q1
     track --video v.avi --camera none.toml --pose pose.csv --out k.json => none.toml

@@ -8,6 +8,7 @@ mod config;
 mod files;
 mod plan;
 mod report;
+mod sim;
 mod streams;
 #[path = "../support/mod.rs"]
 mod support;

@@ -42,12 +42,13 @@ pub(in crate::results) fn run(args: &MujocoArgs) -> Outcome<Option<Value>> {
     let requested = experiment.sequence(CASES, 1, (figure, "throws, cm"));
     let method = requested.method.clone();
     let sequence = Sequence {
-        method: format!("{method}, refined {} times", args.refinement),
+        method: format!("{method}{}", args.remark()),
         ..requested
     };
     let reality = Reality {
         experiment: &experiment,
         mujoco,
+        robust: args.robust,
     };
     let seed = experiment.args.seed;
     let trial = |index: u64| {

@@ -52,10 +52,10 @@ pub(super) fn run(args: &OtherRealityArgs) -> Outcome<Option<Value>> {
     let requested = experiment.sequence(ROPES, 1, (figure, "throws, cm"));
     let sequence = Sequence {
         method: format!(
-            "{} with {}, refined {} times",
+            "{} with {}{}",
             requested.method,
             names.join(" "),
-            args.mujoco.refinement
+            args.mujoco.remark()
         ),
         count: requested.count * channels.len() as u64,
         ..requested
@@ -64,6 +64,7 @@ pub(super) fn run(args: &OtherRealityArgs) -> Outcome<Option<Value>> {
     let reality = Reality {
         experiment: &experiment,
         mujoco,
+        robust: args.mujoco.robust,
     };
     // Rope by rope, with each channel.
     let trial = |number: u64| {

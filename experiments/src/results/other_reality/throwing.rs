@@ -79,6 +79,8 @@ impl Fate {
 pub(super) struct Reality<'a> {
     pub experiment: &'a Experiment<'a>,
     pub mujoco: Mujoco,
+    /// Ropes of the posterior that a first throw is planned for.
+    pub robust: usize,
 }
 
 impl Reality<'_> {
@@ -99,8 +101,8 @@ impl Reality<'_> {
         };
         let (rope, posterior) = (&found.params, &found.posterior);
         let seed = self.experiment.args.seed ^ index;
-        let ensemble =
-            PosteriorEnsemble::drawn(rope, posterior, 0, PosteriorEnsemble::FORECAST, seed);
+        let forecast = PosteriorEnsemble::FORECAST;
+        let ensemble = PosteriorEnsemble::drawn(rope, posterior, self.robust, forecast, seed);
         let fit = Fit {
             residual_px: found.residual_px,
             out_of_distribution: found.out_of_distribution.score,
