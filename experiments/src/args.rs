@@ -77,7 +77,7 @@ pub enum ResultCommand {
     ///
     /// Reads the recordings of a foam cylinder at https://github.com/shamilmamedov/PRB_Net (commit
     /// a9c478d6, folder dataset/pool-noodle), which are not part of this program: fetch them. Takes
-    /// two to three minutes.
+    /// about a minute; interrupted, it keeps nothing.
     RealDlo(RealDloArgs),
 }
 
@@ -88,7 +88,12 @@ pub struct RealDloArgs {
     #[arg(value_name = "DIR")]
     pub dir: PathBuf,
     /// Recordings that the rope is fitted to, by number; it is judged on the others.
-    #[arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = [1, 3, 5])]
+    #[arg(
+        long,
+        value_name = "N,N,…",
+        value_delimiter = ',',
+        default_value = "1,3,5"
+    )]
     pub fitted: Vec<u32>,
     /// Threads; the result does not depend on them.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -118,7 +123,10 @@ impl MujocoArgs {
         let Self {
             refinement, robust, ..
         } = self;
-        format!(", refined {refinement} times, robust over {robust} ropes")
+        match robust {
+            0 => format!(", refined {refinement} times"),
+            _ => format!(", refined {refinement} times, robust over {robust} ropes"),
+        }
     }
 }
 

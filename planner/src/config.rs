@@ -57,6 +57,16 @@ impl PlannerConfig {
     }
 }
 
+impl PlannerConfig {
+    /// The same with this seed for identifications. Nothing else may differ from what a user
+    /// states where a simulated rig is identified: not how well its camera's place is known.
+    #[must_use]
+    pub fn with_identify_seed(mut self, seed: u64) -> Self {
+        self.identify.seed = seed;
+        self
+    }
+}
+
 impl Default for PlannerConfig {
     fn default() -> Self {
         Self {
@@ -76,6 +86,16 @@ impl Default for PlannerConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_demo_knows_no_more_about_its_camera_than_its_user_states() {
+        let mut configured = PlannerConfig::default();
+        configured.identify.camera_position_std_m = 0.005;
+        let mut stated = configured.clone().with_identify_seed(7);
+        assert_eq!(stated.identify.seed, 7);
+        stated.identify.seed = configured.identify.seed;
+        assert_eq!(stated, configured);
+    }
 
     #[test]
     fn an_empty_file_is_the_default_and_unknown_keys_are_refused() {

@@ -114,7 +114,8 @@ pub struct DemoRecord {
     pub track: Option<Tracked>,
     /// The rope.
     pub identified: Option<RopeEstimate>,
-    plan: Option<Value>,
+    /// What the plan promises.
+    pub plan: Option<Value>,
     /// How it was brought to rest.
     pub settle: Option<Settled>,
     /// How late the arm follows its setpoints, from the wiggle (s).

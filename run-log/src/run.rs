@@ -5,6 +5,7 @@ use crate::mcap_file::{RunFilm, is_mcap, replay_bytes};
 use crate::{CommandLine, Cycles, Explanation, RunLog, explain, files};
 use anyhow::{Context, Result, bail, ensure};
 use arm_model::Cell;
+use nalgebra::Vector3;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde_json::Value;
 use shared_types::ipc::message::ScoreResult;
@@ -35,6 +36,25 @@ impl CellHere {
     pub fn of_run(&self, reported: Option<Cell>) -> Cell {
         reported.filter(|_| !self.is_named).unwrap_or(self.cell)
     }
+}
+
+/// Refuses a score whose target is not that of the throw: it is of another film, or of a camera
+/// that stands elsewhere than it is calibrated for.
+fn require_same_target(file: &Path, seen_m: [f64; 3], planned_m: [f64; 3]) -> Result<()> {
+    /// Farthest that a target may be seen from where it was planned (m).
+    const APART_MAX_M: f64 = 0.05;
+    let apart_m = (Vector3::from(seen_m) - Vector3::from(planned_m)).norm();
+    let at = |m: [f64; 3]| m.map(|m| format!("{m:.3}")).join(", ");
+    ensure!(
+        apart_m < APART_MAX_M,
+        "`{}`: the film shows a target at ({}) m, but the throw was planned for ({}) m, {:.1} cm \
+         away: it is the film of another throw, or the camera stands elsewhere",
+        file.display(),
+        at(seen_m),
+        at(planned_m),
+        100.0 * apart_m
+    );
+    Ok(())
 }
 
 /// A folder or a file without a recording.
@@ -131,25 +151,44 @@ impl Run {
     /// The figures of a run that threw.
     ///
     /// # Errors
-    /// It has none, or no plan of a throw.
+    /// It has none, or no plan of a throw, or ended before its throw did.
     pub fn summary_of_throw(&self) -> Result<Value> {
         let name = self.folder.display();
         let has_plan = self.plan()?.is_some();
         let summary = self.summary()?.filter(|s| s.is_object() && has_plan);
-        summary.with_context(|| {
+        let summary = summary.with_context(|| {
             format!(
                 "`{name}` is not the folder of a throw: it lacks {} or {}",
                 files::SUMMARY,
                 files::PLAN
             )
-        })
+        })?;
+        ensure!(
+            summary["ok"] != false,
+            "`{name}` was stopped before its throw was over, so it has no miss: name another run"
+        );
+        Ok(summary)
     }
 
-    /// Keeps what a camera measured of its throw among its figures, where a demo keeps it.
+    /// Keeps what a camera measured of its throw among its figures, in place of what is there.
+    ///
+    /// # Errors
+    /// As [`Self::summary_of_throw`]; the film shows another target than the plan's.
     pub fn keep_score(&self, score: &ScoreResult) -> Result<()> {
         let mut summary = self.summary_of_throw()?;
+        let file = self.folder.join(files::SUMMARY);
+        if let Some(plan) = self.plan()? {
+            require_same_target(&file, score.target_m, plan.target_m)?;
+        }
         summary["score"] = serde_json::to_value(score)?;
-        files::write_json(&self.folder.join(files::SUMMARY), &summary)
+        if let Some(figures) = summary.as_object_mut() {
+            figures.remove("score_failed");
+            // A demo tells it a second time.
+            figures
+                .entry("stereo_tip_target_distance_m")
+                .and_modify(|m| *m = score.closest_m.into());
+        }
+        files::write_json(&file, &summary)
     }
 
     /// Where the tip passed minus the target (m, base frame), as the run's camera measured it.
@@ -169,8 +208,12 @@ impl Run {
         ensure!(
             high_m - low_m < INTERVAL_MAX_M,
             "`{name}`: the camera knows the distance from {low_m:.3} to {high_m:.3} m only \
-             (`score.interval_m`); look at throw.png and name the miss with --miss"
+             (`score.interval_m`); look at the film and name the miss with --miss"
         );
+        let target_m = serde_json::from_value(score["target_m"].clone()).ok();
+        if let Some((target_m, plan)) = target_m.zip(self.plan()?) {
+            require_same_target(&path, target_m, plan.target_m)?;
+        }
         Ok(miss_m)
     }
 

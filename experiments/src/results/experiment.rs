@@ -173,8 +173,8 @@ impl<'a> Experiment<'a> {
 
     /// Draws the distributions next to the result file, if there is one.
     pub fn picture(&self, axis: &str, curves: Vec<Curve>) -> Outcome<Option<PathBuf>> {
-        let of = (self.name, self.args.seed);
-        picture::write(self.args.out.as_deref(), of, axis, &curves)
+        let name = format!("{}, seed {}", self.name, self.args.seed);
+        picture::write(self.args.out.as_deref(), &name, axis, &curves)
     }
 
     /// Ends a run of so many ropes whose result is the rows of a table, each a curve over

@@ -55,19 +55,19 @@ pub(super) fn beside(result: &Path) -> PathBuf {
     }
 }
 
-/// Draws the curves of a result of this name and seed over one axis of powers of ten, next
+/// Draws the curves of a result of this name over one axis of powers of ten, next
 /// to the result file; nothing where there is none. `axis` is what is along it, with its
 /// unit. Colours repeat beyond nine curves.
 pub(super) fn write(
     out: Option<&Path>,
-    (name, seed): (&str, u64),
+    name: &str,
     axis: &str,
     curves: &[Curve],
 ) -> Outcome<Option<PathBuf>> {
     let Some(path) = out.map(beside) else {
         return Ok(None);
     };
-    let title = format!("{name}, seed {seed}, version {VERSION}");
+    let title = format!("{name}, version {VERSION}");
     let mut svg = String::new();
     draw(&mut svg, &title, axis, curves)
         .map_err(|e| anyhow!("picture `{}`: {e}", path.display()))
@@ -191,7 +191,7 @@ mod tests {
             },
         ];
         let axis = "distance of tip and target (cm)";
-        let drawn = |out: Option<&Path>| write(out, ("sim-pipeline", 7), axis, &curves).unwrap();
+        let drawn = |out: Option<&Path>| write(out, "sim-pipeline, seed 7", axis, &curves).unwrap();
         assert_eq!(range(&curves), (0.01, 10.0));
         assert_eq!(drawn(None), None);
         let out = dir.path().join("result.json");

@@ -125,6 +125,7 @@ impl TrialRig {
             // As these films are made: nothing but noise that comes and goes, and a
             // camera as far off as the randomisation puts it.
             noise_min_px: 0.0,
+            keypoint_offset_std_px: 0.0,
             camera_position_std_m: self.randomisation.camera_position_m.max(1e-4),
             camera_look_at_std_m: self.randomisation.camera_lookat_m.max(1e-4),
             method: match (options.method, &self.network) {

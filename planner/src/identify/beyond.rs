@@ -13,8 +13,7 @@ use super::coordinates::{
 use super::descent::{DescentRules, best, descend, go_on};
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
-use super::linear::influence;
-use super::noise::{Noise, RESIDUAL};
+use super::offsets;
 use super::refine::{Refined, SETTLED, refine};
 
 /// Friction (1/m) and logarithm of its slip (1/m) at which the fit starts.
@@ -24,8 +23,6 @@ const CHOICE_STEPS: usize = 3;
 /// Gain of the best start, promised by its slopes and then reached, below which the fit is not
 /// made.
 const PROMISE_MIN: f64 = 6.0;
-/// Deviation of what a tracker's keypoint is off by all through a film (px).
-const OFFSET_STD_PX: f64 = 0.3;
 /// Least gain in cost (half of a sum of squared deviations). By chance nine numbers
 /// gain four or five; a real tracker's errors on nine films of plain ropes gained up to 42.
 const GAIN_MIN: f64 = 50.0;
@@ -87,41 +84,13 @@ pub(super) fn beyond(
     let found = refine(film, &coordinates, &chosen.x, noise_px, budget)?;
     let cost = |fit: &Refined, x: &Point| {
         let normal = fit.at.normal(film, Fidelity::Fine, &found.noise);
-        normal.total_cost(&coordinates, x) - offsets_gain(fit, film, &found.noise)
+        normal.total_cost(&coordinates, x) - offsets::gain(fit, film, &found.noise)
             + counts_out_of_range(fit, &found)
     };
     // What the parts of the film disagree by is no evidence.
     let gain = (cost(&plain, &without) - cost(&found, &found.x)) / found.inflation;
     tracing::debug!(gain, inflation = found.inflation, x = ?found.x.as_slice(), "fit beyond the nine parameters");
     Ok(if gain > GAIN_MIN { found } else { plain })
-}
-
-/// By how much the cost falls where keypoints may be off by the same all through the film: a
-/// tracker's edge that is a little beside the rope's looks like a rope that curls. Offsets of
-/// neighbours are taken to be as alike as their noise.
-fn offsets_gain(fit: &Refined, film: &Film<'_>, noise: &Noise) -> f64 {
-    const OFFSET: usize = 0;
-    let grid = film.grid(Fidelity::Fine);
-    let mut rows = fit.at.rows.clone();
-    for axis in rows.iter_mut().flatten().flatten() {
-        axis[OFFSET] = 1.0;
-    }
-    noise.whiten(grid, &mut rows, OFFSET + 1);
-    let of_keypoint = |keypoint: usize, axis: usize| {
-        let mine = rows.iter().skip(keypoint).step_by(grid.keypoints).flatten();
-        let (pull, weight) = mine.fold((0.0, 0.0), |(pull, weight), row| {
-            let [offset, residual] = [row[axis][OFFSET], row[axis][RESIDUAL]];
-            let counts = influence(row);
-            (
-                pull + counts * offset * residual,
-                weight + counts * offset * offset,
-            )
-        });
-        0.5 * pull * pull / (weight + OFFSET_STD_PX.powi(-2))
-    };
-    (0..grid.keypoints)
-        .map(|keypoint| of_keypoint(keypoint, 0) + of_keypoint(keypoint, 1))
-        .sum()
 }
 
 /// What it costs a fit that its rope has a link count of the ranges, by what the fit with

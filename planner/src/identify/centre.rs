@@ -27,6 +27,8 @@ pub(super) struct Centre {
     variance: f64,
     /// What is left when the count is known, as if the parts of the film agreed.
     covariance: Matrix,
+    /// What errors that last through the film add to that.
+    lasting: Matrix,
     /// What can be, whatever the film and whichever the ranges.
     lower: Vector,
     upper: Vector,
@@ -38,6 +40,14 @@ impl Centre {
         let covariance = Matrix::from_fn(|i, j| fit.covariance[(DRAWN[i], DRAWN[j])]);
         let with_links = Vector::from_fn(|i, _| fit.covariance[(DRAWN[i], LINKS)]);
         let variance = fit.covariance[(LINKS, LINKS)].max(1e-9);
+        // Of the coordinates without what moves along with the count.
+        let slope = with_links / variance;
+        let lasting = |i: usize, j: usize| {
+            let of = |i: usize, j: usize| fit.lasting[(i, j)];
+            let (a, b) = (DRAWN[i], DRAWN[j]);
+            of(a, b) - slope[i] * of(LINKS, b) - of(a, LINKS) * slope[j]
+                + slope[i] * slope[j] * of(LINKS, LINKS)
+        };
         let any_clock = ClockWindow {
             offset_s: 0.0,
             half_width_s: 1.0,
@@ -49,6 +59,7 @@ impl Centre {
             with_links,
             variance,
             covariance: covariance - with_links * with_links.transpose() / variance,
+            lasting: Matrix::from_fn(lasting),
             lower: drawn(&bounds.lower),
             upper: drawn(&bounds.upper),
         }
@@ -86,7 +97,7 @@ impl Centre {
 
     /// Square root of the covariance around it, widened.
     pub(super) fn root(&self, inflation: f64) -> Matrix {
-        let widened = self.covariance * inflation;
+        let widened = self.covariance * inflation + self.lasting;
         widened.cholesky().map_or_else(Matrix::zeros, |c| c.l())
     }
 

@@ -24,6 +24,7 @@ mod information;
 mod linear;
 mod network;
 mod noise;
+mod offsets;
 mod options;
 mod out_of_distribution;
 mod posterior;

@@ -2,6 +2,7 @@
 
 use super::camera_pose::CORRECTIONS;
 use super::error::IdentifyError;
+use super::offsets::OFFSET_STD_PX;
 use crate::OutOfRange;
 use crate::observation::Observation;
 use serde::{Deserialize, Serialize};
@@ -68,6 +69,9 @@ pub struct IdentifyOptions {
     /// Least deviation of a keypoint, along and across the rope (px): errors that last
     /// through the film do not show in what a fit leaves over.
     pub noise_min_px: f64,
+    /// Deviation of what each keypoint is off by all through the film, along and across the rope
+    /// (px): the intervals of the parameters allow for it.
+    pub keypoint_offset_std_px: f64,
     /// Keypoints below this confidence are not used.
     pub confidence_min: f64,
     /// Distance (px) above which a search counts as caught in a local minimum
@@ -100,6 +104,7 @@ impl Default for IdentifyOptions {
             camera_look_at_std_m: 0.02,
             camera_roll_std_rad: 0.01,
             noise_min_px: 0.2,
+            keypoint_offset_std_px: OFFSET_STD_PX,
             confidence_min: 0.2,
             repeat_above_px: 4.5,
             repeats_max: 2,
@@ -183,6 +188,12 @@ fn check_options(o: &IdentifyOptions) -> Result<(), IdentifyError> {
         deviation("camera_look_at_std_m", o.camera_look_at_std_m),
         deviation("camera_roll_std_rad", o.camera_roll_std_rad),
         within("noise_min_px", o.noise_min_px, 0.0..=10.0, "0 to 10 px"),
+        within(
+            "keypoint_offset_std_px",
+            o.keypoint_offset_std_px,
+            0.0..=10.0,
+            "0 to 10 px",
+        ),
         within("population", population, 4.0..=1e4, "4 to 10000"),
         count("generations", o.generations, 10_000_000, "1 to 10000000"),
         positive("search_frames_max", o.search_frames_max),
@@ -207,7 +218,7 @@ mod tests {
     #[test]
     fn options_out_of_range_are_refused_by_name() {
         type Change = fn(&mut IdentifyOptions);
-        let cases: [(&str, Change); 15] = [
+        let cases: [(&str, Change); 16] = [
             ("length_m", |o| o.length_m = Some(55.0)),
             ("population", |o| o.population = 3),
             ("population", |o| o.population = usize::MAX),
@@ -222,6 +233,9 @@ mod tests {
             ("repeat_above_px", |o| o.repeat_above_px = f64::INFINITY),
             ("step_s", |o| o.step_s = 0.0),
             ("noise_min_px", |o| o.noise_min_px = -1.0),
+            ("keypoint_offset_std_px", |o| {
+                o.keypoint_offset_std_px = 11.0
+            }),
             ("lead_mass_kg", |o| o.lead_mass_kg = Some(f64::NAN)),
         ];
         assert!(check_options(&IdentifyOptions::default()).is_ok());

@@ -8,7 +8,7 @@
 //! drawn ropes.
 
 use super::centre::{Centre, Vector};
-use super::coordinates::{LINKS, extras_of, link_range, parameter};
+use super::coordinates::{LINKS, Square, extras_of, link_range, parameter};
 use super::film::Film;
 use super::refine::Refined;
 use super::scale;
@@ -90,7 +90,9 @@ fn draw(fit: &Refined, centre: &Centre, film: &Film<'_>) -> Vec<Draw> {
     let root = centre.root(fit.inflation);
     let (low, _) = link_range();
     // The variance of the count from the fit alone.
-    let counts_variance = fit.covariance[(LINKS, LINKS)] * fit.inflation + LINKS_STD.powi(2);
+    let variance = |of: &Square| of[(LINKS, LINKS)];
+    let counts_variance =
+        variance(&fit.covariance) * fit.inflation + variance(&fit.lasting) + LINKS_STD.powi(2);
     let counts = count_probabilities(fit.x[LINKS], counts_variance);
     let uniform = |rng: &mut ChaCha12Rng, i: usize| rng.random_range(RANGES[i].min..=RANGES[i].max);
     (0..DRAWS)

@@ -11,6 +11,7 @@ use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
 use super::linear::{Linearised, Normal};
 use super::noise::Noise;
+use super::offsets;
 
 /// Most steps: until the noise is known, with its first estimate, and with the second at
 /// the likeliest link count.
@@ -28,6 +29,8 @@ pub(super) struct Refined {
     pub(super) at: Linearised,
     /// Covariance of the coordinates, their fitting prior included.
     pub(super) covariance: Square,
+    /// What errors that last through the film add to it, however well its parts agree.
+    pub(super) lasting: Square,
     pub(super) noise: Noise,
     /// Factor by which the parts of the film disagree more than the noise says,
     /// variance; 1 or more.
@@ -68,7 +71,10 @@ pub(super) fn refine(
         .cholesky()
         .map_or_else(|| coordinates.prior_information(), |f| f.inverse());
     let inflation = disagreement(&normal, &covariance, coordinates.fitted).max(1.0);
+    let rows = (&iterate.at.rows, coordinates.fitted);
+    let std_px = film.options.keypoint_offset_std_px;
     Ok(Refined {
+        lasting: offsets::covariance(rows, &covariance, film, &noise, std_px),
         x: iterate.x,
         at: iterate.at,
         covariance,

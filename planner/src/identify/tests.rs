@@ -2,9 +2,12 @@
 
 use super::budget::Budget;
 use super::coordinates::{
-    DAMPING, LEAD_RADIUS, LENGTH, LINKS, Point, Reach, STIFFNESS, parameter, point_of,
+    DAMPING, LEAD_RADIUS, LENGTH, LINKS, PLAIN, Point, Reach, STIFFNESS, Square, parameter,
+    point_of,
 };
-use super::film::Film;
+use super::film::{Fidelity, Film};
+use super::noise::{Noise, RESIDUAL};
+use super::offsets;
 use super::options::IdentifyOptions;
 use super::posterior::posterior;
 use super::refine::{Refined, refine};
@@ -127,5 +130,50 @@ fn every_reported_rope_can_be_one() {
         assert!(params.validate().is_ok(), "{params:?}");
         assert!((params.length_m - rope.length_m).abs() < 2e-3, "{params:?}");
         assert!(posterior.interval_90[parameter::LEAD_RADIUS][0] > 0.0);
+    });
+}
+
+/// What errors that last add is how far the fit moves when each keypoint in turn, along and
+/// across the rope, is off all through the film.
+#[test]
+fn lasting_errors_widen_a_fit_by_how_far_they_move_it() {
+    const OFFSET_PX: f64 = 0.05;
+    let rope = random_rope(3);
+    with_film(&rope, |film, budget| {
+        let fit = refined(film, Reach::Ranges, &point_of(&rope), budget);
+        let coordinates = film.coordinates(film.clock_window(), Reach::Ranges);
+        let noise = Noise::white(0.3);
+        let at = |rows| {
+            let mut at = fit.at.clone();
+            at.rows = rows;
+            at.normal(film, Fidelity::Fine, &noise)
+        };
+        let still = at(fit.at.rows.clone());
+        let information = still.information + coordinates.prior_information();
+        let covariance = information.cholesky().unwrap().inverse();
+        let keypoints = film.grid(Fidelity::Fine).keypoints;
+        let mut moved = Square::zeros();
+        for keypoint in 0..keypoints {
+            for axis in 0..2 {
+                let mut rows = fit.at.rows.clone();
+                for row in rows.iter_mut().skip(keypoint).step_by(keypoints).flatten() {
+                    row[axis][RESIDUAL] += OFFSET_PX;
+                }
+                let step = covariance * (at(rows).gradient - still.gradient);
+                moved += step * step.transpose();
+            }
+        }
+        let of = |std_px| {
+            let rows = (&fit.at.rows, PLAIN);
+            offsets::covariance(rows, &covariance, film, &noise, std_px)
+        };
+        let found = of(OFFSET_PX);
+        assert!(moved[(LENGTH, LENGTH)] > 0.0);
+        assert!(
+            (found - moved).norm() < 0.01 * moved.norm(),
+            "{found} {moved}"
+        );
+        assert_eq!(of(0.0), Square::zeros());
+        assert!(fit.lasting[(LENGTH, LENGTH)] > 0.0);
     });
 }

@@ -11,8 +11,9 @@ use super::setup::{Count, Setup};
 use super::{
     PlanError, PlanOptions, PlanRequest, PosteriorEnsemble, Strike, ThrowGoal, start_pose_for,
 };
+use crate::PlannerConfig;
 use crate::arm_response::Following;
-use arm_model::{JointTrajectory, JointVector, TrajectoryError};
+use arm_model::{Cell, JointTrajectory, JointVector, Limits, TrajectoryError};
 use core::f64::consts::PI;
 use nalgebra::Vector3;
 use shared_types::plan::Aim;
@@ -48,7 +49,7 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
     if response != last.arm_response.as_deref() {
         let named = |source: Option<&str>| source.unwrap_or("none").to_owned();
         return refused(format!(
-            "the last throw was planned for an arm with the response of `{}`, this one would be for `{}`: give the same response",
+            "the last throw was planned for an arm with the response of `{}`, this one would be for `{}`: give the same one with --arm-response FILE",
             named(last.arm_response.as_deref()),
             named(response)
         ));
@@ -127,6 +128,54 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
     })
 }
 
+impl PlanRequest {
+    /// What [`plan_again`] is asked for where `last` is corrected in a cell, with these values of
+    /// the planner.
+    #[must_use]
+    pub fn to_correct(
+        last: &Plan,
+        cell: Cell,
+        (limits, config): (Limits, &PlannerConfig),
+        following: Option<Following>,
+    ) -> Self {
+        Self {
+            goal: config.goal(last.task, last.target_m),
+            rope: last.rope,
+            cell,
+            options: PlanOptions {
+                seed: last.seed,
+                ..config.search
+            },
+            ensemble: PosteriorEnsemble::default(),
+            following,
+            limits,
+        }
+    }
+}
+
+/// One line for people: what `last` missed by, how the aim of `corrected` moves, and whether
+/// that is worth a throw.
+#[must_use]
+pub fn correction(last: &Plan, corrected: &Plan, miss_m: [f64; 3]) -> String {
+    let mm = |v: Vector3<f64>| {
+        let [x, y, z] = (1e3 * v).into();
+        format!("({x:+.1}, {y:+.1}, {z:+.1}) mm")
+    };
+    let aim = |plan: &Plan| Vector3::from(plan.aim.map_or(plan.target_m, |aim| aim.point_m));
+    let miss = Vector3::from(miss_m);
+    let little = if miss.norm() < 2.0 * MISS_STD_M {
+        "; a camera is off by about as much, so this brings little"
+    } else {
+        ""
+    };
+    format!(
+        "correction {}: the tip passed {} from the target, the aim moves by {}{little}",
+        corrected.aim.map_or(1, |aim| aim.corrections),
+        mm(miss),
+        mm(aim(corrected) - aim(last))
+    )
+}
+
 fn refused(why: impl Into<String>) -> Result<Plan, PlanError> {
     Err(PlanError::Again(why.into()))
 }
@@ -181,7 +230,6 @@ fn turned_by(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::PlannerConfig;
     use crate::plan::tests::request;
     use crate::plan::{ThrowSimulator, plan, simulator_for};
     use rope_sim::{Candidate, FrameTimes, PlannedArm, roll_out};

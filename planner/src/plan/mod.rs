@@ -29,7 +29,7 @@ mod tests;
 mod throw;
 mod waypoints;
 
-pub use again::{MISS_STD_M, plan_again};
+pub use again::{MISS_STD_M, correction, plan_again};
 pub use assess::{Shortcoming, shortcoming, warnings};
 pub use config::{PlanOptions, Robustness, ThrowConfig, ThrowWeights};
 pub use drape::{Drape, DrapeConfig};

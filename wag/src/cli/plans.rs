@@ -8,7 +8,7 @@ use shared_types::CommandInterface;
 use std::path::PathBuf;
 
 /// What every plan is made with.
-#[derive(Debug, Default, Args)]
+#[derive(Debug, Args)]
 pub struct PlannerArgs {
     /// Limits of the arm (TOML), laid over the effective ones (`wag config show limits`).
     #[arg(long)]

@@ -2,12 +2,11 @@
 //! bottom as the data flows.
 
 mod rope;
-mod settings;
 mod summary;
 
 use super::plan_again::LastThrow;
 use super::runs::explain_stop;
-use crate::cli::{DemoArgs, PlannerArgs};
+use crate::cli::DemoArgs;
 use crate::config;
 use crate::pipeline::{self, ArmLink, BringUp, RunFolder, execute};
 use crate::session::Session;
@@ -25,7 +24,6 @@ use rand_chacha::ChaCha8Rng;
 use rig_sim::RigConfig;
 use run_log::{DemoRecord, Film, files};
 use serde_json::Value;
-use settings::settings;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::rope::RANGES;
@@ -67,15 +65,13 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
             "a demo of the {task} is not implemented in this version; `wag plan {task}` plans and judges one in simulation"
         ));
     }
-    let last = args.again.as_deref().map(LastDemo::read).transpose()?;
-    let rig_config = match &last {
-        Some(last) => Some(&last.rig_config),
-        None => args.rig_config.as_ref(),
-    };
+    let last = args.again.as_deref().map(last_demo).transpose()?;
+    let (last, rig_config) = last.unzip();
+    let rig_config = rig_config.as_ref().or(args.rig_config.as_ref());
     let rig: RigConfig = config::here(rig_config.map(PathBuf::as_path)).or_input()?;
     let seed = last.as_ref().map_or(args.seed, |_| rig.seed);
     let target_m = match (&last, args.target) {
-        (Some(last), _) => last.throw.plan.target_m,
+        (Some(last), _) => last.plan.target_m,
         (None, Some(target)) => target.0,
         (None, None) => random_target(seed),
     };
@@ -83,19 +79,23 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
     check_reach(target_m, RANGES[1].max, &rig.cell).or_input()?;
     clear_of_arm(target_m, &rig.cell).or_input()?;
     watch_interrupts().or_failed()?;
-    let plan = last.map(|last| last.throw.corrected(&PlannerArgs::default()));
+    args.out
+        .as_deref()
+        .map_or(Ok(()), RunFolder::refuse_existing)?;
+    let plan = last.map(|last| {
+        let ways = (
+            config::here(None).or_input()?,
+            config::here(None).or_input()?,
+        );
+        last.to_throw(ways, None)
+    });
     let plan = plan.transpose()?;
     let folder = RunFolder::create(args.out.as_deref(), &format!("demo-{seed}"))?;
     let began = Instant::now();
     let mut record = DemoRecord::new(seed, target_m, &folder.path);
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    let way = match plan {
-        Some(plan) => Way::Again(Box::new(plan)),
-        None => Way::Whole {
-            accept_unconfirmed: args.accept_unconfirmed,
-        },
-    };
-    let result = throw_once(&folder, &mut session, &mut record, &rig, &way);
+    let accept = args.accept_unconfirmed;
+    let result = throw_once(&folder, &mut session, &mut record, &rig, (plan, accept));
     session.end(result.is_ok());
     record.wall_s = began.elapsed().as_secs_f64();
     let keypoints_kept = session.received.keep_keypoints(&folder.path);
@@ -121,59 +121,40 @@ fn keep_report(run: &Path) {
     }
 }
 
-/// A demo that was made.
-struct LastDemo {
-    throw: LastThrow,
-    /// The rig as it was, seed and all.
-    rig_config: PathBuf,
-}
-
-impl LastDemo {
-    fn read(run: &Path) -> Outcome<Self> {
-        let rig_config = run.join("config").join("rig.toml");
-        if !rig_config.is_file() {
-            return Err(bad_input!(
-                "`{}` is not the folder of a demo: it lacks config/rig.toml",
-                run.display()
-            ));
-        }
-        Ok(Self {
-            throw: LastThrow::read(run, None)?,
-            rig_config,
-        })
+/// The throw of a demo, and the file of its rig, seed and all.
+fn last_demo(run: &Path) -> Outcome<(LastThrow, PathBuf)> {
+    let rig_config = run.join("config").join("rig.toml");
+    if !rig_config.is_file() {
+        return Err(bad_input!(
+            "`{}` is not the folder of a demo: it lacks config/rig.toml",
+            run.display()
+        ));
     }
+    Ok((LastThrow::read(run, None)?, rig_config))
 }
 
-/// How a demo comes to its throw.
-enum Way {
-    /// By the film of a wiggle.
-    Whole { accept_unconfirmed: bool },
-    /// By a plan that corrects a throw at the same rig.
-    Again(Box<Plan>),
-}
-
-/// The whole throw; each line hands the next what it found.
+/// The whole throw; each line hands the next what it found. A `corrected` plan needs no wiggle.
 fn throw_once(
     folder: &RunFolder,
     session: &mut Session,
     record: &mut DemoRecord,
     rig: &RigConfig,
-    way: &Way,
+    (corrected, accept_unconfirmed): (Option<Plan>, bool),
 ) -> anyhow::Result<()> {
-    let settings = settings(config::here(None)?, record.seed);
+    let settings = config::here::<PlannerConfig>(None)?.with_identify_seed(record.seed);
     let rig_config = pipeline::rig_config(folder, rig, record.seed, record.target_m);
     let mut demo = Demo::start(folder, session, record, settings, &rig_config)?;
-    let plan = match way {
-        Way::Again(plan) => {
-            demo.keep_plan(plan)?;
+    let plan = match corrected {
+        Some(plan) => {
+            demo.keep_plan(&plan)?;
             demo.bring_up(&plan.trajectory)?;
-            (**plan).clone()
+            plan
         }
-        Way::Whole { accept_unconfirmed } => {
+        None => {
             let motion = wiggle(&demo.settings.wiggle, &demo.limits)?;
             demo.bring_up(&motion)?;
             let film = demo.wiggle(&motion)?;
-            let tracked = demo.track(&film, *accept_unconfirmed)?;
+            let tracked = demo.track(&film, accept_unconfirmed)?;
             let rope = demo.identify(&film, tracked)?;
             let plan = demo.plan(&rope)?;
             demo.settle(&rope, &film, &motion, &plan)?;
@@ -283,7 +264,7 @@ impl<'a> Demo<'a> {
         let stage = Stage::begin("bring-up");
         let mut found = BringUp::default();
         pipeline::acquire(self.session, &self.arm, &mut found)?;
-        self.record.warnings = found.warnings;
+        self.record.warnings.extend(found.warnings);
         pipeline::arm_for(self.session, &self.arm, OperatingMode::SetUp, None)?;
         pipeline::move_to(self.session, &self.arm, motion.start(), MOVE_SPEED)?;
         let still = self.wait_still(&stage)?;

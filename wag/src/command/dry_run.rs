@@ -3,27 +3,35 @@
 use super::check::print_tightest;
 use crate::cli::ArmArgs;
 use crate::config;
+use crate::pipeline::ArmAddress;
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome};
 use planner::preflight::{JudgedArm, arm_margins, first_stop};
 use rt_controller::ControllerConfig;
 use serde_json::{Value, json};
+use shared_types::CommandInterface;
 
-/// Tells step by step what `wag` would do with a trajectory that keeps the limits.
-///
-/// # Errors
-/// The arm, as delivered, would stop by a rule of its own.
-pub fn tell(
-    arm: &ArmArgs,
+/// The command interface by which a motion would reach the arm.
+fn interface_to(address: Option<&ArmAddress>) -> Outcome<CommandInterface> {
+    match address.and_then(|address| address.service.as_ref()) {
+        Some(service) => Ok(service.config.command_interface),
+        None => {
+            let config = config::here::<ControllerConfig>(None).or_input()?;
+            Ok(config.command_interface)
+        }
+    }
+}
+
+/// Refuses a trajectory that keeps the limits but that the arm, as delivered, would stop by a
+/// rule of its own.
+pub fn refuse_stopped(
+    address: Option<&ArmAddress>,
     limits: &Limits,
     trajectory: &JointTrajectory,
     name: &str,
-) -> Outcome<Value> {
-    let interface = config::here::<ControllerConfig>(None)
-        .or_input()?
-        .command_interface;
+) -> Outcome {
     let judge = JudgedArm {
-        interface,
+        interface: interface_to(address)?,
         ..JudgedArm::default()
     };
     let judged = arm_margins(trajectory, limits, &judge);
@@ -33,10 +41,20 @@ pub fn tell(
             |code| format!("the arm, with C{code}"),
         );
         return Err(failed!(
-            "dry run: the {name} keeps the limits but would be stopped by {by}: {}",
+            "the {name} keeps the limits but would be stopped by {by}: {}",
             stop.describe()
         ));
     }
+    Ok(())
+}
+
+/// Tells step by step what `wag` would do with a trajectory that may be sent.
+pub fn tell(
+    arm: &ArmArgs,
+    limits: &Limits,
+    trajectory: &JointTrajectory,
+    name: &str,
+) -> Outcome<Value> {
     let margins = limits.margins(trajectory);
     let duration_s = trajectory.duration_s();
     let address = arm
@@ -60,7 +78,7 @@ pub fn tell(
     );
     let tightest = print_tightest(&margins);
     Ok(json!({
-        "dry_run": true, "duration_s": duration_s, "start_rad": trajectory.start(), "interface": interface,
+        "dry_run": true, "duration_s": duration_s, "start_rad": trajectory.start(), "interface": interface_to(None)?,
         "tightest": tightest,
     }))
 }

@@ -10,9 +10,9 @@ use arm_model::{JointVector, Limits};
 use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use run_log::{Cycles, files};
 use serde_json::{Value, json};
-use shared_types::OperatingMode;
 use shared_types::ipc::IpcError;
 use shared_types::ipc::message::ControllerRequest;
+use shared_types::{OperatingMode, Plan};
 use std::path::{Path, PathBuf};
 
 /// How the arm is when a motion is confirmed.
@@ -20,7 +20,7 @@ pub const AT_START: &str = "The arm stands at the start.";
 /// Part of the arm's speed limits used for the move to the start pose.
 pub const MOVE_SPEED: f64 = 0.1;
 
-/// Moves the arm at `address` to `start` and lets `work` go on. When the processes have ended, `conclude`
+/// Moves the arm at `address` to `start` and lets `work` go on; a throw's plan is kept before. When the processes have ended, `conclude`
 /// makes the run's summary from its folder, the received cycles and what `work` returned.
 /// Returns the folder and the summary.
 ///
@@ -31,13 +31,15 @@ pub fn on_arm(
     address: ArmAddress,
     limits: &Limits,
     start: JointVector,
-    (out, name): (Option<&Path>, &str),
+    (out, name, plan): (Option<&Path>, &str, Option<&Plan>),
     work: impl FnOnce(&mut Session, &ArmLink) -> anyhow::Result<Value>,
     conclude: impl FnOnce(&Path, Cycles, Value) -> anyhow::Result<Value>,
 ) -> Outcome<(PathBuf, Value)> {
     watch_interrupts().or_failed()?;
     let operator = operator(arm, &address)?;
     let mut folder = RunFolder::create(out, name)?;
+    let kept = plan.map(|plan| files::write_json(&folder.file(files::PLAN), plan));
+    kept.transpose().or_failed()?;
     if let Some(service) = &address.service {
         folder.domain.clone_from(&service.config.domain);
     }

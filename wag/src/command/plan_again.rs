@@ -1,12 +1,14 @@
 //! `wag plan again`: the last strike, corrected by its miss.
 
 use super::plan::{check_fault, classify, describe, read, tell};
-use crate::cli::{AgainArgs, PlannerArgs, Point};
+use crate::cli::{AgainArgs, Point};
 use crate::config;
 use anyhow::anyhow;
-use arm_model::Cell;
+use arm_model::{ArmResponse, Cell, Limits};
 use cli_output::{OrInput, Outcome, Stage};
-use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, plan_again, warnings};
+use planner::PlannerConfig;
+use planner::arm_response::Following;
+use planner::plan::{PlanRequest, Shortcoming, correction, plan_again, shortcoming, warnings};
 use run_log::{Run, files};
 use serde_json::{Value, json};
 use shared_types::Plan;
@@ -25,6 +27,8 @@ impl LastThrow {
     pub fn read(last: &Path, miss: Option<Point>) -> Outcome<Self> {
         let run = last.is_dir().then(|| Run::open(last));
         let run = run.transpose().or_input()?;
+        let thrown = run.as_ref().map(Run::summary_of_throw).transpose();
+        thrown.or_input()?;
         let in_run = run.as_ref().map(|run| run.folder().join(files::PLAN));
         let plan = files::read_plan(in_run.as_deref().unwrap_or(last)).or_input()?;
         let unnamed = || {
@@ -40,32 +44,42 @@ impl LastThrow {
         })
     }
 
-    /// The same throw, changed so that the miss is taken out.
-    pub fn corrected(&self, args: &PlannerArgs) -> Outcome<Plan> {
-        let (limits, config, following) = read(args).or_input()?;
+    /// The same throw, changed so that the miss is taken out, for an arm that follows like this.
+    pub fn corrected(
+        &self,
+        (limits, config): (Limits, PlannerConfig),
+        following: Option<Following>,
+    ) -> Outcome<Plan> {
         let last = &self.plan;
-        let request = PlanRequest {
-            goal: config.goal(last.task, last.target_m),
-            rope: last.rope,
-            cell: self.cell,
-            options: PlanOptions {
-                seed: last.seed,
-                ..config.search
-            },
-            ensemble: PosteriorEnsemble::default(),
-            following,
-            limits,
-        };
+        let request = PlanRequest::to_correct(last, self.cell, (limits, &config), following);
         let stage = Stage::begin("plan");
         let plan = plan_again(&request, last, self.miss_m).map_err(classify)?;
         stage.done(&describe(&plan));
+        println!("{}", correction(last, &plan, self.miss_m));
         Ok(plan)
+    }
+
+    /// The same, for a throw at once: by an arm whose response counts if it did before.
+    pub fn to_throw(
+        &self,
+        (limits, config): (Limits, PlannerConfig),
+        response: Option<ArmResponse>,
+    ) -> Outcome<Plan> {
+        let response = response.filter(|_| self.plan.arm_response.is_some());
+        let following = response.map(|response| Following::new(&response, &limits));
+        let plan = self.corrected((limits, config), following)?;
+        tell(&plan);
+        match shortcoming(&plan) {
+            Some(Shortcoming { message, is_severe }) if is_severe => Err(failed!(message)),
+            _ => Ok(plan),
+        }
     }
 }
 
 pub fn run(args: &AgainArgs) -> Outcome<Option<Value>> {
     let last = LastThrow::read(&args.last, args.miss)?;
-    let plan = last.corrected(&args.planner)?;
+    let (limits, config, following) = read(&args.planner).or_input()?;
+    let plan = last.corrected((limits, config), following)?;
     check_fault(&plan, args.allow_miss, &args.out).or_failed()?;
     tell(&plan);
     files::write_json(&args.out, &plan).or_failed()?;

@@ -3,7 +3,7 @@
 use crate::cli::ScoreArgs;
 use camera_ingest::{ScoreError, load_camera, open_video, score};
 use cli_output::{Failure, OrInput, Outcome, Stage};
-use run_log::Run;
+use run_log::{Run, files};
 use serde_json::{Value, json};
 use shared_types::ipc::message::ScoreResult;
 use std::path::Path;
@@ -17,8 +17,10 @@ pub fn not_scored(error: ScoreError, video: &Path) -> Failure {
 pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     let run = args.run.as_deref().map(Run::open).transpose().or_input()?;
     // One that cannot keep a score is refused before anything is measured.
-    let summary = run.as_ref().map(Run::summary_of_throw);
-    summary.transpose().or_input()?;
+    if let Some(run) = &run {
+        run.summary_of_throw().or_input()?;
+        files::check_writable(&run.folder().join(files::SUMMARY)).or_input()?;
+    }
     let camera = load_camera(&args.film.camera).or_input()?;
     let mut video = open_video(&args.film.video, args.film.fps).or_input()?;
     let stage = Stage::begin("score");
@@ -37,8 +39,9 @@ pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     let score = ScoreResult::from(&found);
     let kept = run.map(|run| run.keep_score(&score));
     kept.transpose().or_failed()?;
-    Ok(Some(json!({
-        "ok": true, "command": "score", "run": args.run, "closest_m": found.closest_m, "interval_m": found.interval_m, "miss_m": found.miss_m,
-        "time_s": found.time_s, "target_m": found.target_m,
-    })))
+    let mut value = serde_json::to_value(score).or_failed()?;
+    value["ok"] = true.into();
+    value["command"] = "score".into();
+    value["run"] = json!(args.run);
+    Ok(Some(value))
 }

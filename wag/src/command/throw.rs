@@ -3,20 +3,18 @@
 use super::area::{asks, limits, reach_measured, require_clear_area};
 use super::dry_run;
 use super::on_arm::{AT_START, on_arm};
-use super::plan::{LOOK, tell};
+use super::plan::LOOK;
 use super::plan_again::LastThrow;
 use super::unconfirmed::confirm;
-use crate::cli::{ArmArgs, PlannerArgs, ThrowArgs};
+use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
 use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
 use crate::session::Session;
-use arm_model::{JOINTS, JointTrajectory, Limits};
+use arm_model::{ArmResponse, JOINTS, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
-use planner::plan::{Shortcoming, shortcoming};
 use rt_controller::armed_speed::ArmedSpeed;
 use rt_controller::control::{Motion, OperatingModeSpeeds};
 use rt_controller::os::now_ns;
-use run_log::Cycles;
 use run_log::files::{self, read_plan};
 use serde_json::{Value, json};
 use shared_types::{OperatingMode, Plan};
@@ -88,6 +86,7 @@ pub fn drive(
     };
     let slow_enough = armed.check(&Motion::Spline(*trajectory));
     slow_enough.map_err(|why| bad_input!("the {name} is too fast: {why}"))?;
+    dry_run::refuse_stopped(address.as_ref(), limits, trajectory, name)?;
     if arm.dry_run {
         out.map_or(Ok(()), RunFolder::refuse_existing)?;
         return dry_run::tell(arm, limits, trajectory, name).map(Some);
@@ -120,49 +119,44 @@ pub fn drive(
             "start_ns": span.start_ns, "end_ns": span.end_ns, "latency": latency,
         }))
     };
-    let place = (out, name);
-    let keep = |folder: &Path, _: Cycles, value| {
-        plan.map_or(Ok(()), |plan| {
-            files::write_json(&folder.join(files::PLAN), plan)
-        })?;
+    let place = (out, name, plan);
+    let (folder, value) = on_arm(arm, address, limits, start, place, work, |_, _, value| {
         Ok(value)
-    };
-    let (folder, value) = on_arm(arm, address, limits, start, place, work, keep)?;
+    })?;
     println!("done; run folder: {}", folder.display());
     Ok(Some(value))
 }
 
-/// The plan that is named, or the one that takes out the miss of the run that is.
-fn plan_of(args: &ThrowArgs) -> Outcome<Plan> {
-    let (Some(run), arm) = (&args.again, &args.arm) else {
-        let path = args.plan.as_deref().unwrap_or(Path::new(""));
-        return read_plan(path).or_input();
-    };
-    let last = LastThrow::read(run, args.miss)?;
-    let is_followed = last.plan.arm_response.is_some();
-    let plan = last.corrected(&PlannerArgs {
-        limits: arm.limits.clone(),
-        config: None,
-        arm_response: arm.arm_response.clone().filter(|_| is_followed),
-    })?;
-    tell(&plan);
-    match shortcoming(&plan) {
-        Some(Shortcoming { message, is_severe }) if is_severe => {
-            Err(failed!("{message}: plan anew"))
-        }
-        _ => Ok(plan),
-    }
-}
-
 pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
-    let plan = plan_of(args)?;
-    confirm(&plan.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
-    config::cell_for(&plan).or_input()?;
+    let named = args.plan.as_deref().map(read_plan).transpose().or_input()?;
+    let last = args.again.as_deref();
+    let last = last
+        .map(|run| LastThrow::read(run, args.miss))
+        .transpose()?;
+    let throws = named.iter().chain(last.as_ref().map(|last| &last.plan));
+    for plan in throws {
+        confirm(&plan.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
+        config::cell_for(plan).or_input()?;
+    }
+    args.out
+        .as_deref()
+        .map_or(Ok(()), RunFolder::refuse_existing)?;
     let address = reach_measured(&args.arm)?;
+    let limits = limits(&args.arm, address.as_ref())?;
+    let plan = match (named, &last) {
+        (Some(plan), _) => plan,
+        (None, Some(last)) => {
+            let config = config::here(None).or_input()?;
+            last.to_throw(
+                (limits.clone(), config),
+                response(&args.arm, address.as_ref())?,
+            )?
+        }
+        (None, None) => return Err(bad_input!("name a plan, or a run with --again RUN")),
+    };
     if let Some(address) = &address {
         require_clear_area(&args.arm, address, "MOVE")?;
     }
-    let limits = limits(&args.arm, address.as_ref())?;
     let run = drive(
         &args.arm,
         address,
@@ -171,7 +165,23 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
         args.out.as_deref(),
         Some(&plan),
     )?;
-    Ok(Some(
-        json!({ "ok": true, "command": "throw", "plan": args.plan, "again": args.again, "run": run }),
-    ))
+    Ok(Some(json!({
+        "ok": true, "command": "throw", "plan": args.plan, "again": args.again,
+        "miss_m": last.map(|last| last.miss_m), "aim": plan.aim, "forecast": plan.forecast, "run": run,
+    })))
+}
+
+/// How the arm follows, as far as that is known: what a correction is made with where the last
+/// throw was.
+fn response(arm: &ArmArgs, address: Option<&ArmAddress>) -> Outcome<Option<ArmResponse>> {
+    match address {
+        Some(address) => Ok(address
+            .arm_response
+            .as_ref()
+            .map(|(_, response)| response.clone())),
+        None => {
+            let named = arm.arm_response.as_deref().map(files::read_arm_response);
+            named.transpose().or_input()
+        }
+    }
 }

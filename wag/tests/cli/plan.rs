@@ -24,6 +24,9 @@ fn a_correction_without_a_miss_or_a_throw_is_refused() {
     put("hidden/plan.json", &plan.to_string());
     let score = "{\"score\": {\"miss_m\": [0.1, 0, 0], \"interval_m\": [0.0, 0.199]}}";
     put("hidden/summary.json", score);
+    std::fs::create_dir(dir.path().join("stopped")).unwrap();
+    put("stopped/plan.json", &plan.to_string());
+    put("stopped/summary.json", "{\"ok\": false}");
     are_refused_in(
         dir.path(),
         2,
@@ -37,7 +40,8 @@ fn a_correction_without_a_miss_or_a_throw_is_refused() {
          plan again plan.json --miss nan,0,0 --out p.json => finite
          throw --again plan.json --arm 127.0.0.1 => --miss
          throw --again run --arm 127.0.0.1 => summary.json | wag score --run
-         throw --again plan.json --miss 0,0.3,0 --arm 127.0.0.1 => 30.0 cm is too far
+         throw --again plan.json --miss 0,0.3,0 --dry-run => 30.0 cm is too far
+         throw --again stopped --miss 0,0.01,0 --arm 127.0.0.1 => stopped | name another run
          demo --again run => run | config/rig.toml",
     );
     assert!(!dir.path().join("p.json").exists());

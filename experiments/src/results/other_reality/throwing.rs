@@ -3,7 +3,7 @@
 use super::case::Case;
 use super::child::Mujoco;
 use crate::results::experiment::Experiment;
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, ensure};
 use arm_model::{Cell, JointTrajectory};
 use experiments::trials::{KEYPOINTS, alone};
 use nalgebra::Vector3;
@@ -103,6 +103,12 @@ impl Reality<'_> {
         let seed = self.experiment.args.seed ^ index;
         let forecast = PosteriorEnsemble::FORECAST;
         let ensemble = PosteriorEnsemble::drawn(rope, posterior, self.robust, forecast, seed);
+        ensure!(
+            ensemble.optimised.len() == self.robust,
+            "rope {index}: only {} of {} ropes could be drawn",
+            ensemble.optimised.len(),
+            self.robust
+        );
         let fit = Fit {
             residual_px: found.residual_px,
             out_of_distribution: found.out_of_distribution.score,

@@ -59,6 +59,22 @@ pub(super) fn tips(
     Ok(rollouts.iter().map(tip).collect())
 }
 
+/// Distance of the tip in each row of a recording (m), for each of some values; not a number where
+/// the simulation diverges.
+pub(super) fn distances(
+    recording: &Recording,
+    all: &[Values],
+    threads: usize,
+) -> anyhow::Result<Vec<Vec<f64>>> {
+    let paths = tips(recording, all, (f64::INFINITY, 1), threads)?;
+    let of = |path: Option<Vec<Vector3<f64>>>| {
+        let path = path.unwrap_or_else(|| vec![Vector3::repeat(f64::NAN); recording.tip_m.len()]);
+        let pairs = path.iter().zip(&recording.tip_m);
+        pairs.map(|(a, b)| (a - b).norm()).collect()
+    };
+    Ok(paths.into_iter().map(of).collect())
+}
+
 /// Some recordings that a rope is fitted to.
 struct Fit<'a> {
     recordings: &'a [&'a Recording],

@@ -156,6 +156,27 @@ pub(super) fn rope(x: &Values) -> RopeParams {
     plain.with_extras(extras)
 }
 
+/// Names of the fitted numbers that are at a bound of the search.
+pub(super) fn at_bounds(x: &Values, physics: Physics) -> Vec<&'static str> {
+    const NAMES: [&str; COUNT] = [
+        "length",
+        "stiffness",
+        "damping",
+        "tilt about y",
+        "tilt about z",
+        "drag",
+        "curvature about x",
+        "curvature about y",
+        "mass slope",
+        "clamp stiffness",
+        "friction",
+        "slip",
+    ];
+    let [_, _, fitted] = physics.stages();
+    let is_at = |i: &usize| x[*i] <= PARAMETERS[*i].low || x[*i] >= PARAMETERS[*i].high;
+    fitted.into_iter().filter(is_at).map(|i| NAMES[i]).collect()
+}
+
 /// Turns of the rope against its holder, about the base's y axis and then its own z axis (rad).
 pub(super) fn tilt_rad(x: &Values) -> [f64; 2] {
     TILT.map(|i| x[i])

@@ -36,8 +36,9 @@ const COLUMNS: [&str; 25] = [
     "p_e_y",
     "p_e_z",
 ];
-/// The base moves once it is farther from its first place than this (m).
+/// The base moves once it is farther from its first pose than this (m, rad).
 const MOVED_M: f64 = 2e-3;
+const TURNED_RAD: f64 = 2e-3;
 
 /// One recording, from rest.
 #[derive(Debug, Clone)]
@@ -65,7 +66,9 @@ impl Recording {
             (place(&row[1..]), attitude)
         };
         let base: Vec<_> = rows.iter().map(base).collect();
-        let has_moved = |(p, _): &(Vector3<f64>, _)| (p - base[0].0).norm() > MOVED_M;
+        let has_moved = |(p, attitude): &(Vector3<f64>, UnitQuaternion<f64>)| {
+            (p - base[0].0).norm() > MOVED_M || attitude.angle_to(&base[0].1) > TURNED_RAD
+        };
         let moves_from = base.iter().position(has_moved);
         let stem = path.file_stem().unwrap_or_default();
         let recording = Self {

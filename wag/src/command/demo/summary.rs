@@ -62,6 +62,14 @@ pub fn show(record: &DemoRecord) {
     let planned = cm(record.planned_tip_target_distance_m);
     let achieved = cm(record.true_tip_target_distance_m);
     println!("  planned      {planned}");
+    let interval = record
+        .plan
+        .as_ref()
+        .map(|plan| &plan["forecast"]["interval_90_m"]);
+    if let Some((low, high)) = interval.and_then(|i| i[0].as_f64().zip(i[1].as_f64())) {
+        let [low, high] = [low, high].map(|m| 100.0 * m);
+        println!("  forecast     {low:.1} to {high:.1} cm in nine of ten");
+    }
     println!("  achieved     {achieved}   (the simulator's truth)");
     match (&record.score, &record.score_failed) {
         (Some(score), _) => println!(

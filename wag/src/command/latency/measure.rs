@@ -79,7 +79,7 @@ pub(super) fn measure(
     let Some((_, first)) = sweeps.first() else {
         return Err(bad_input!("name a joint with --joints"));
     };
-    let place = (args.out.as_deref(), "latency");
+    let place = (args.out.as_deref(), "latency", None);
     let source = format!("arm {}:{}", address.ip, address.command);
     let (_, found) = on_arm(
         &args.arm,

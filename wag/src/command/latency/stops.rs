@@ -178,7 +178,7 @@ pub(super) fn measure(args: &LatencyArgs) -> Outcome<Value> {
         measured?;
         Ok(json!({ "command": "latency", "stops": stops }))
     };
-    let place = (args.out.as_deref(), "stops");
+    let place = (args.out.as_deref(), "stops", None);
     let (_, found) = on_arm(
         &args.arm,
         address,
