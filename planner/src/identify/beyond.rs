@@ -84,7 +84,7 @@ pub(super) fn beyond(
     let found = refine(film, &coordinates, &chosen.x, noise_px, budget)?;
     let cost = |fit: &Refined, x: &Point| {
         let normal = fit.at.normal(film, Fidelity::Fine, &found.noise);
-        normal.total_cost(&coordinates, x) - offsets::gain(fit, film, &found.noise)
+        normal.total_cost(&coordinates, x) - offsets::gain(&fit.at.rows, film, &found.noise)
             + counts_out_of_range(fit, &found)
     };
     // What the parts of the film disagree by is no evidence.

@@ -8,10 +8,8 @@ use super::coordinates::{FREE, Point, Square};
 use super::film::{Fidelity, Film};
 use super::linear::influence;
 use super::noise::{Noise, RESIDUAL, Row, Rows};
-use super::refine::Refined;
+use super::options::OFFSET_STD_PX;
 
-/// Deviation of what a tracker's keypoint is off by all through a film (px).
-pub(super) const OFFSET_STD_PX: f64 = 0.3;
 /// Column of the offset's slope in rows whose other slopes do not matter.
 const OFFSET: usize = 0;
 
@@ -27,9 +25,9 @@ fn slopes(rows: &Rows, film: &Film<'_>, noise: &Noise) -> Rows {
 
 /// By how much the cost falls where keypoints have offsets: those of an edge beside the rope's
 /// look like a rope that curls.
-pub(super) fn gain(fit: &Refined, film: &Film<'_>, noise: &Noise) -> f64 {
+pub(super) fn gain(rows: &Rows, film: &Film<'_>, noise: &Noise) -> f64 {
     let keypoints = film.grid(Fidelity::Fine).keypoints;
-    let slopes = slopes(&fit.at.rows, film, noise);
+    let slopes = slopes(rows, film, noise);
     let of_keypoint = |keypoint: usize, axis: usize| {
         let mine = slopes.iter().skip(keypoint).step_by(keypoints).flatten();
         let (pull, weight) = mine.fold((0.0, 0.0), |(pull, weight), row| {

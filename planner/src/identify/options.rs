@@ -2,11 +2,13 @@
 
 use super::camera_pose::CORRECTIONS;
 use super::error::IdentifyError;
-use super::offsets::OFFSET_STD_PX;
 use crate::OutOfRange;
 use crate::observation::Observation;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
+
+/// Deviation of what a tracker's keypoint is off by all through a film (px).
+pub(super) const OFFSET_STD_PX: f64 = 0.3;
 
 /// How a rope is identified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
