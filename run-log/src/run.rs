@@ -165,7 +165,11 @@ impl Run {
         })?;
         ensure!(
             summary["ok"] != false,
-            "`{name}` was stopped before its throw was over, so it has no miss: name another run"
+            "`{name}` ended with an error ({}): name another run, or its plan.json and the miss \
+             with --miss if it threw all the same",
+            summary["error"]
+                .as_str()
+                .unwrap_or("of which nothing is kept")
         );
         Ok(summary)
     }

@@ -1,8 +1,10 @@
 //! Errors of a tracker that last through a film: an edge that is a little beside the rope's, a lens
 //! that is not quite as calibrated. They hide in the fit, not in what it leaves over.
 //!
-//! Each keypoint, along and across the rope, may be off by the same all through the film. Offsets
-//! of neighbours are taken to be as alike as their noise.
+//! Each keypoint, along and across the rope, may be off by the same all through the film. The slopes
+//! are those of an offset that neighbours share, and what each keypoint's adds is taken to be
+//! independent: less than independent offsets of that size would, or ones as alike as the noise.
+//! The size was found with these slopes.
 
 use super::coordinates::{FREE, Point, Square};
 use super::film::{Fidelity, Film};

@@ -49,7 +49,7 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
     if response != last.arm_response.as_deref() {
         let named = |source: Option<&str>| source.unwrap_or("none").to_owned();
         return refused(format!(
-            "the last throw was planned for an arm with the response of `{}`, this one would be for `{}`: give the same one with --arm-response FILE",
+            "the last throw was planned for an arm with the response of `{}`, this one would be for `{}`: give the same one (--arm-response, or the controller's arm_response_file), or plan anew",
             named(last.arm_response.as_deref()),
             named(response)
         ));

@@ -4,6 +4,7 @@ use super::check::print_tightest;
 use crate::cli::ArmArgs;
 use crate::config;
 use crate::pipeline::ArmAddress;
+use arm_model::limits::TOOL_SPEED_RATED_M_S;
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome};
 use planner::preflight::{JudgedArm, arm_margins, first_stop};
@@ -22,17 +23,20 @@ fn interface_to(address: Option<&ArmAddress>) -> Outcome<CommandInterface> {
     }
 }
 
-/// Refuses a trajectory that keeps the limits but that the arm, as delivered, would stop by a
-/// rule of its own.
+/// Refuses a trajectory that keeps the limits but that the arm would stop by a rule of its own,
+/// set up as a bring-up requires: its tool may be as fast as the limits allow.
 pub fn refuse_stopped(
     address: Option<&ArmAddress>,
     limits: &Limits,
     trajectory: &JointTrajectory,
     name: &str,
 ) -> Outcome {
+    let delivered = JudgedArm::default();
+    let set_up = delivered.speed_factor.max(limits.tcp_speed_max_m_s);
     let judge = JudgedArm {
         interface: interface_to(address)?,
-        ..JudgedArm::default()
+        speed_factor: set_up.min(TOOL_SPEED_RATED_M_S),
+        ..delivered
     };
     let judged = arm_margins(trajectory, limits, &judge);
     if let Some(stop) = first_stop(&judged) {

@@ -38,7 +38,7 @@ pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     println!("{line}");
     let score = ScoreResult::from(&found);
     let kept = run.map(|run| run.keep_score(&score));
-    kept.transpose().or_failed()?;
+    kept.transpose().or_input()?;
     let mut value = serde_json::to_value(score).or_failed()?;
     value["ok"] = true.into();
     value["command"] = "score".into();

@@ -12,6 +12,7 @@ use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
 use crate::session::Session;
 use arm_model::{ArmResponse, JOINTS, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
+use planner::plan::warnings;
 use rt_controller::armed_speed::ArmedSpeed;
 use rt_controller::control::{Motion, OperatingModeSpeeds};
 use rt_controller::os::now_ns;
@@ -97,6 +98,7 @@ pub fn drive(
         ));
     };
     require_measured_joints(&address, trajectory, name)?;
+    require_clear_area(arm, &address, "MOVE")?;
     let start = trajectory.start();
     let is_asked = asks(arm, &address);
     let work = |session: &mut Session, link: &ArmLink| {
@@ -154,9 +156,6 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
         }
         (None, None) => return Err(bad_input!("name a plan, or a run with --again RUN")),
     };
-    if let Some(address) = &address {
-        require_clear_area(&args.arm, address, "MOVE")?;
-    }
     let run = drive(
         &args.arm,
         address,
@@ -167,7 +166,8 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
     )?;
     Ok(Some(json!({
         "ok": true, "command": "throw", "plan": args.plan, "again": args.again,
-        "miss_m": last.map(|last| last.miss_m), "aim": plan.aim, "forecast": plan.forecast, "run": run,
+        "miss_m": last.map(|last| last.miss_m), "aim": plan.aim, "forecast": plan.forecast,
+        "warnings": warnings(&plan), "run": run,
     })))
 }
 
@@ -180,8 +180,13 @@ fn response(arm: &ArmArgs, address: Option<&ArmAddress>) -> Outcome<Option<ArmRe
             .as_ref()
             .map(|(_, response)| response.clone())),
         None => {
-            let named = arm.arm_response.as_deref().map(files::read_arm_response);
-            named.transpose().or_input()
+            let mut places = config::arm_response_files().or_input()?;
+            let here = places.find(|file| file.exists());
+            let named = arm.arm_response.clone().or(here);
+            named
+                .map(|file| files::read_arm_response(&file))
+                .transpose()
+                .or_input()
         }
     }
 }

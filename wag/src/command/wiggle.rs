@@ -1,6 +1,6 @@
 //! `wag wiggle`: the probing motion, written to a file or executed.
 
-use super::area::{limits, reach_measured, require_clear_area};
+use super::area::{limits, reach_measured};
 use super::throw::drive;
 use super::wiggle_design;
 use crate::cli::WiggleArgs;
@@ -21,9 +21,6 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
         ));
     }
     let address = reach_measured(&args.arm)?;
-    if let Some(address) = &address {
-        require_clear_area(&args.arm, address, "MOVE")?;
-    }
     let limits = limits(&args.arm, address.as_ref())?;
     let config = config::here::<PlannerConfig>(None).or_input()?.wiggle;
     let trajectory = wiggle(&config, &limits).or_failed()?;

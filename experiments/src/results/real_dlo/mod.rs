@@ -34,8 +34,8 @@ const SOURCE: &str =
 /// from the first row on, as here.
 const AUTHORS_RECORDING: &str = "traj8";
 const AUTHORS: [(&str, [f64; 2]); 2] = [
-    ("the authors' network (rnn_LFK)", [0.0426, 0.0593]),
-    ("the authors' physical model (rfem)", [0.1860, 0.3075]),
+    ("the authors' network (rnn_LFK)", [0.0408, 0.0593]),
+    ("the authors' physical model (rfem)", [0.1765, 0.3075]),
 ];
 /// Time from when the base moves, and from the first row (s).
 const SHORT_S: f64 = 5.0;
