@@ -103,7 +103,7 @@ pub struct DemoRecord {
     /// Distance measured by the stereo camera (m).
     stereo_tip_target_distance_m: Option<f64>,
     /// Instant that times in the run's files count from (CLOCK_MONOTONIC, ns): the
-    /// wiggle's first frame.
+    /// wiggle's first frame, or the throw's where there was no wiggle.
     epoch_ns: u64,
     /// Wall time of the whole demo (s).
     pub wall_s: f64,

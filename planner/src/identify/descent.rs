@@ -133,19 +133,25 @@ impl Iterate {
         }
     }
 
+    /// The normal equations with the prior.
+    fn equations(&self, coordinates: &Coordinates) -> (Square, Point) {
+        (
+            self.normal.information + coordinates.prior_information(),
+            self.normal.gradient + coordinates.prior_gradient(&self.x),
+        )
+    }
+
     /// The cost that an undamped step leads to if everything is linear; less than any real step
     /// reaches, but for a curve that happens to help.
     pub(super) fn promised_cost(&self, coordinates: &Coordinates) -> f64 {
-        let normal = self.normal.information + coordinates.prior_information();
-        let gradient = self.normal.gradient + coordinates.prior_gradient(&self.x);
+        let (normal, gradient) = self.equations(coordinates);
         let step = normal.cholesky().map(|factors| factors.solve(&gradient));
         step.map_or(self.cost, |step| self.cost - 0.5 * step.dot(&gradient))
     }
 
     /// The point a damped step leads to; `None` if there is no step.
     fn trial(&mut self, coordinates: &Coordinates) -> Option<Point> {
-        let normal = self.normal.information + coordinates.prior_information();
-        let gradient = self.normal.gradient + coordinates.prior_gradient(&self.x);
+        let (normal, gradient) = self.equations(coordinates);
         let damped = normal + Square::from_diagonal(&(normal.diagonal() * self.damping));
         let step = damped.cholesky().map(|f| f.solve(&gradient));
         self.settled = step.is_none();

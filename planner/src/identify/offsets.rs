@@ -6,7 +6,7 @@
 //! independent: less than independent offsets of that size would, or ones as alike as the noise.
 //! The size was found with these slopes.
 
-use super::coordinates::{FREE, Point, Square};
+use super::coordinates::{Point, Square};
 use super::film::{Fidelity, Film};
 use super::linear::influence;
 use super::noise::{Noise, RESIDUAL, Row, Rows};
@@ -74,7 +74,7 @@ pub(super) fn covariance(
                 .flatten()
             {
                 let counts = influence(row) * offset[axis][OFFSET];
-                for i in 0..fitted.min(FREE) {
+                for i in 0..fitted {
                     pull[i] += counts * row[axis][i];
                 }
             }

@@ -194,28 +194,23 @@ pub(super) fn fit(
 
 #[cfg(test)]
 mod tests {
-    use super::super::recording::tests::write;
+    use super::super::recording::tests::recorded;
     use super::*;
 
     /// A rope that the fit does not start at is found by its tip, and met where it was not seen.
     #[test]
     fn a_simulated_rope_is_found() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("traj1.csv");
-        write(&path, &[Vector3::zeros(); 1000]);
         let mut truth = Physics::Elastic.start();
         for (value, by) in truth.iter_mut().zip([-0.1, 0.4, 0.3, 0.15, 0.05]) {
             *value += by;
         }
-        let still = Recording::read(&path).unwrap();
+        let still = recorded(&[Vector3::zeros(); 1000]);
         let tip = |values, until_s| {
             let mut paths = tips(&still, &[values], (until_s, 1), 1).unwrap();
             paths.remove(0).unwrap()
         };
         let whole = tip(truth, f64::INFINITY);
-        let seen = dir.path().join("traj2.csv");
-        write(&seen, &whole[..700]);
-        let seen = Recording::read(&seen).unwrap();
+        let seen = recorded(&whole[..700]);
         let found = fit(Physics::Elastic, &[&seen], 1, &|_, _| ()).unwrap();
         let apart = tip(found, f64::INFINITY).into_iter().zip(&whole);
         let farthest_m = apart.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);

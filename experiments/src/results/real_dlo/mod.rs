@@ -250,16 +250,13 @@ fn mean_of_others(rows: &[Row], physics: Physics) -> Row {
 
 #[cfg(test)]
 mod tests {
-    use super::recording::tests::write;
+    use super::recording::tests::{recorded, write};
     use super::*;
     use nalgebra::Vector3;
 
     #[test]
     fn errors_are_of_the_rest_the_motion_and_the_beginning() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("traj1.csv");
-        write(&path, &[Vector3::zeros(); 2000]);
-        let recording = Recording::read(&path).unwrap();
+        let recording = recorded(&[Vector3::zeros(); 2000]);
         let moves = recording.moves_from;
         let distance = |row: usize| if row < moves { 1e-3 } else { 2e-3 };
         let distances: Vec<f64> = (0..2000).map(distance).collect();

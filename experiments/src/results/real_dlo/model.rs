@@ -11,6 +11,7 @@ pub(super) type Values = SVector<f64, COUNT>;
 
 /// One fitted number.
 pub(super) struct Parameter {
+    name: &'static str,
     pub start: f64,
     /// Step of its slope.
     pub step: f64,
@@ -18,8 +19,9 @@ pub(super) struct Parameter {
     high: f64,
 }
 
-const fn about(start: f64, step: f64, [low, high]: [f64; 2]) -> Parameter {
+const fn about(name: &'static str, start: f64, step: f64, [low, high]: [f64; 2]) -> Parameter {
     Parameter {
+        name,
         start,
         step,
         low,
@@ -50,23 +52,23 @@ const SLIP: usize = 11;
 
 /// Bounds keep the search where the simulator can follow; none is a prior.
 pub(super) const PARAMETERS: [Parameter; COUNT] = [
-    about(1.85, 2e-3, [1.0, 3.0]),
+    about("length", 1.85, 2e-3, [1.0, 3.0]),
     // Logarithms of N m/rad and N m s/rad.
-    about(1.1, 0.02, [-3.0, 4.0]),
-    about(-0.5, 0.02, [-5.0, 2.2]),
-    about(0.3, 5e-3, [-1.0, 1.0]),
-    about(0.0, 5e-3, [-0.5, 0.5]),
+    about("stiffness", 1.1, 0.02, [-3.0, 4.0]),
+    about("damping", -0.5, 0.02, [-5.0, 2.2]),
+    about("tilt about y", 0.3, 5e-3, [-1.0, 1.0]),
+    about("tilt about z", 0.0, 5e-3, [-0.5, 0.5]),
     // Logarithm of the drag coefficient across the rope.
-    about(0.0, 0.03, [OFF, 3.0]),
+    about("drag", 0.0, 0.03, [OFF, 3.0]),
     // rad/m.
-    about(0.0, 5e-3, [-1.0, 1.0]),
-    about(0.0, 5e-3, [-1.0, 1.0]),
-    about(0.0, 0.02, [-0.9, 0.9]),
+    about("curvature about x", 0.0, 5e-3, [-1.0, 1.0]),
+    about("curvature about y", 0.0, 5e-3, [-1.0, 1.0]),
+    about("mass slope", 0.0, 0.02, [-0.9, 0.9]),
     // Logarithm of the first joint's stiffness by the others'.
-    about(0.0, 0.03, [-1.5, 1.5]),
+    about("clamp stiffness", 0.0, 0.03, [-1.5, 1.5]),
     // Logarithms of N m and rad/m.
-    about(-4.0, 0.05, [OFF, 0.0]),
-    about(0.0, 0.05, [-3.0, 2.5]),
+    about("friction", -4.0, 0.05, [OFF, 0.0]),
+    about("slip", 0.0, 0.05, [-3.0, 2.5]),
 ];
 
 /// How much of physics a fit has.
@@ -158,23 +160,12 @@ pub(super) fn rope(x: &Values) -> RopeParams {
 
 /// Names of the fitted numbers that are at a bound of the search.
 pub(super) fn at_bounds(x: &Values, physics: Physics) -> Vec<&'static str> {
-    const NAMES: [&str; COUNT] = [
-        "length",
-        "stiffness",
-        "damping",
-        "tilt about y",
-        "tilt about z",
-        "drag",
-        "curvature about x",
-        "curvature about y",
-        "mass slope",
-        "clamp stiffness",
-        "friction",
-        "slip",
-    ];
     let [_, _, fitted] = physics.stages();
-    let is_at = |i: &usize| x[*i] <= PARAMETERS[*i].low || x[*i] >= PARAMETERS[*i].high;
-    fitted.into_iter().filter(is_at).map(|i| NAMES[i]).collect()
+    let at = |i: usize| {
+        let p = &PARAMETERS[i];
+        (x[i] <= p.low || x[i] >= p.high).then_some(p.name)
+    };
+    fitted.into_iter().filter_map(at).collect()
 }
 
 /// Turns of the rope against its holder, about the base's y axis and then its own z axis (rad).

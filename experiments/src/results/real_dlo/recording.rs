@@ -143,12 +143,17 @@ pub(super) mod tests {
         std::fs::write(path, text).unwrap();
     }
 
-    #[test]
-    fn the_rope_leaves_along_the_base_s_turned_x_axis() {
+    /// The recording with this base and tip.
+    pub(in super::super) fn recorded(tip_m: &[Vector3<f64>]) -> Recording {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("traj1.csv");
-        write(&path, &[Vector3::new(1.0, 2.0, 3.0); 300]);
-        let recording = Recording::read(&path).unwrap();
+        write(&path, tip_m);
+        Recording::read(&path).unwrap()
+    }
+
+    #[test]
+    fn the_rope_leaves_along_the_base_s_turned_x_axis() {
+        let recording = recorded(&[Vector3::new(1.0, 2.0, 3.0); 300]);
         assert_eq!(recording.name, "traj1");
         assert_eq!(recording.tip_m[299], Vector3::new(1.0, 2.0, 3.0));
         assert!((recording.duration_s() - 1.196).abs() < 1e-9);
