@@ -347,6 +347,8 @@ pub struct RopeEstimate {
     pub circumstances: FitCircumstances,
     /// Whether the rope is one of those the ranges know.
     pub out_of_distribution: OutOfDistribution,
+    /// What speaks against relying on it, each with a remedy.
+    pub warnings: Vec<String>,
 }
 
 #[cfg(test)]

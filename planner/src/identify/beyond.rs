@@ -8,9 +8,10 @@
 
 use super::budget::Budget;
 use super::coordinates::{
-    CLAMP, Coordinates, FRICTION, LINKS, Point, SLIP, link_range, middle_links, nearest_links,
+    CLAMP, Coordinates, FRICTION, LENGTH, LINKS, Point, SLIP, link_range, middle_links,
+    nearest_links,
 };
-use super::descent::{DescentRules, best, descend, go_on};
+use super::descent::{DescentRules, Iterate, best, descend, go_on};
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
 use super::offsets;
@@ -26,6 +27,10 @@ const PROMISE_MIN: f64 = 6.0;
 /// Least gain in cost (half of a sum of squared deviations). By chance nine numbers
 /// gain four or five; a real tracker's errors on nine films of plain ropes gained up to 42.
 const GAIN_MIN: f64 = 50.0;
+/// Cost by which another start may end above the best one and explain the film as well, and the
+/// lengths (m) from which it is another rope.
+const RIVAL_COST: f64 = 2.0;
+const RIVAL_APART_M: f64 = 0.01;
 
 /// The fit with everything that a real rope may have, where the film shows it, else the
 /// plain one.
@@ -66,13 +71,9 @@ pub(super) fn beyond(
         tracing::debug!(promise, "nothing beyond the nine parameters");
         return Ok(plain);
     }
-    let chosen = best(go_on(
-        film,
-        &coordinates,
-        begun,
-        &rules(CHOICE_STEPS),
-        budget,
-    )?)?;
+    let candidates = go_on(film, &coordinates, begun, &rules(CHOICE_STEPS), budget)?;
+    let rival_length_m = rival_length_m(&candidates);
+    let chosen = best(candidates)?;
     let promise = plain_cost - chosen.cost;
     if promise < PROMISE_MIN {
         tracing::debug!(
@@ -90,7 +91,24 @@ pub(super) fn beyond(
     // What the parts of the film disagree by is no evidence.
     let gain = (cost(&plain, &without) - cost(&found, &found.x)) / found.inflation;
     tracing::debug!(gain, inflation = found.inflation, x = ?found.x.as_slice(), "fit beyond the nine parameters");
-    Ok(if gain > GAIN_MIN { found } else { plain })
+    Ok(if gain > GAIN_MIN {
+        Refined {
+            rival_length_m,
+            ..found
+        }
+    } else {
+        plain
+    })
+}
+
+/// Length (m) of the start that ended farthest from the best one among those that explain the
+/// film as well; none where they agree.
+fn rival_length_m(candidates: &[Iterate]) -> Option<f64> {
+    let (best, others) = candidates.split_first()?;
+    let apart_m = |w: &&Iterate| (w.x[LENGTH] - best.x[LENGTH]).abs();
+    let equal = others.iter().filter(|w| w.cost < best.cost + RIVAL_COST);
+    let rival = equal.max_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
+    (apart_m(&rival) > RIVAL_APART_M).then_some(rival.x[LENGTH])
 }
 
 /// What it costs a fit that its rope has a link count of the ranges, by what the fit with

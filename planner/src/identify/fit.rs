@@ -12,6 +12,7 @@ use super::out_of_distribution::out_of_distribution;
 use super::posterior::{posterior, std_dev};
 use super::propose::{fast_search, from_proposal};
 use super::refine::{Refined, refine};
+use super::reliance::warnings;
 use super::search::search;
 use super::steps::short_enough;
 use crate::observation::Observation;
@@ -173,6 +174,7 @@ impl Fit<'_> {
                 camera_rotation_rad,
             },
             out_of_distribution,
+            warnings: warnings(fit, &self.film, self.clock),
         }
     }
 }

@@ -30,6 +30,7 @@ mod out_of_distribution;
 mod posterior;
 mod propose;
 mod refine;
+mod reliance;
 pub mod scale;
 mod search;
 mod steps;

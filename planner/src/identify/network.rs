@@ -93,6 +93,7 @@ pub(super) fn estimate(
         // It fits neither noise nor camera.
         circumstances: FitCircumstances::default(),
         out_of_distribution: out_of_distribution(score, distance_px),
+        warnings: Vec::new(),
     })
 }
 

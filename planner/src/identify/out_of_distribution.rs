@@ -7,6 +7,7 @@ use super::coordinates::{
     DAMPING, LEAD_MASS, LEAD_RADIUS, LENGTH, LINKS, Point, STIFFNESS, parameter,
 };
 use super::refine::Refined;
+use super::reliance::INFLATION_MAX;
 use shared_types::rope::{OutOfDistribution, RANGES};
 
 /// Score from which a rope counts as outside.
@@ -35,7 +36,9 @@ pub(super) fn out_of_distribution(fit: &Refined) -> OutOfDistribution {
     let mut worst = f64::NEG_INFINITY;
     let mut reasons = Vec::new();
     for edge in edges(&fit.x) {
-        let variance = (fit.covariance * edge.slope).dot(&edge.slope).max(0.0) * fit.inflation;
+        // A film that contradicts itself does not make its rope any more likely.
+        let inflation = fit.inflation.min(INFLATION_MAX);
+        let variance = (fit.covariance * edge.slope).dot(&edge.slope).max(0.0) * inflation;
         let score = edge.value / variance.sqrt().hypot(edge.tolerance);
         worst = worst.max(score);
         if score >= LIMIT {

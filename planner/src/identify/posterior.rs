@@ -11,6 +11,7 @@ use super::centre::{Centre, Vector};
 use super::coordinates::{LINKS, Square, extras_of, link_range, parameter};
 use super::film::Film;
 use super::refine::Refined;
+use super::reliance::unexplained_m;
 use super::scale;
 use crate::observation::Appearance;
 use nalgebra::SMatrix;
@@ -59,7 +60,7 @@ pub(super) fn posterior(fit: &Refined, film: &Film<'_>) -> (RopeParams, RopePost
     for d in &mut draws {
         d.weight /= total;
     }
-    let posterior = summarise(&draws, fit, film.viewer.pixel_m());
+    let posterior = summarise(&draws, fit, film);
     let params = likeliest(
         &draws,
         &posterior,
@@ -184,7 +185,7 @@ fn quantiles<const N: usize>(
     })
 }
 
-fn summarise(draws: &[Draw], fit: &Refined, pixel_m: f64) -> RopePosterior {
+fn summarise(draws: &[Draw], fit: &Refined, film: &Film<'_>) -> RopePosterior {
     let mut mean = [0.0; ROPE_PARAMETERS];
     for d in draws {
         for (m, v) in mean.iter_mut().zip(d.values) {
@@ -209,7 +210,7 @@ fn summarise(draws: &[Draw], fit: &Refined, pixel_m: f64) -> RopePosterior {
         links_probability,
         ambiguities: ambiguities(&covariance),
         inflation: fit.inflation,
-        residual_m: fit.at.distance_px * pixel_m,
+        residual_m: unexplained_m(fit, film),
     }
 }
 

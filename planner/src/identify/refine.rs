@@ -35,6 +35,8 @@ pub(super) struct Refined {
     /// Factor by which the parts of the film disagree more than the noise says,
     /// variance; 1 or more.
     pub(super) inflation: f64,
+    /// Length (m) of another rope that explains the film as well; none where all starts agree.
+    pub(super) rival_length_m: Option<f64>,
 }
 
 /// Refines the fit from a start.
@@ -80,6 +82,7 @@ pub(super) fn refine(
         covariance,
         noise,
         inflation,
+        rival_length_m: None,
     })
 }
 

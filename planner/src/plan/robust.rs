@@ -5,7 +5,7 @@ use super::search::{Search, Valued};
 use super::setup::{Count, Setup};
 use super::{PlanError, ThrowOutcome};
 use arm_model::kinematics::link_poses;
-use arm_model::{JointTrajectory, JointVector};
+use arm_model::{JOINTS, JointTrajectory, JointVector};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -93,7 +93,7 @@ impl Setup<'_> {
             .collect();
         let outcomes = self.simulator.run(&throws)?;
         let of_throw = |(t, outcomes): (_, &[ThrowOutcome])| {
-            let each = |(rope, o): (_, &ThrowOutcome)| self.fitness(rope, t, o);
+            let each = |(rope, o): (_, &ThrowOutcome)| self.fitness(rope, t, &self.widened(t, o));
             let errors = outcomes.iter().map(|o| self.task.error_m(o));
             Valued {
                 fitness: risk(ropes.iter().zip(outcomes).map(each).collect()),
@@ -103,6 +103,31 @@ impl Setup<'_> {
         };
         let all = trajectories.iter().zip(outcomes.chunks(ropes.len().max(1)));
         Ok(all.map(of_throw).collect())
+    }
+
+    /// The outcome of a strike that is to be robust, as far from the target as is to be expected with
+    /// this rope: zeros of the joints, and what the model leaves out, let the tip pass beside its
+    /// simulated path. Any other outcome as it is.
+    pub(super) fn widened(
+        &self,
+        trajectory: &JointTrajectory,
+        outcome: &ThrowOutcome,
+    ) -> ThrowOutcome {
+        let ensemble = &self.request.ensemble;
+        if ensemble.optimised.is_empty() || !self.task.polishes() {
+            return outcome.clone();
+        }
+        let mut square_m2 = 2.0 * ensemble.discrepancy_m.powi(2);
+        for joint in 0..JOINTS {
+            let mut zeros = JointVector::splat(0.0);
+            zeros[joint] = ensemble.joint_zero_std_rad;
+            let beside = across(outcome, displaced_m(trajectory, &zeros, outcome));
+            square_m2 += beside.norm_squared();
+        }
+        ThrowOutcome {
+            closest_m: outcome.closest_m.hypot(square_m2.sqrt()),
+            ..outcome.clone()
+        }
     }
 
     /// The error to expect of a throw over the ropes of the forecast.
@@ -143,18 +168,23 @@ impl Setup<'_> {
 }
 
 impl Setup<'_> {
-    /// Error of a throw whose tip passes `beside` its simulated path (m). What is beside along
-    /// the path makes the tip early or late and nothing else.
+    /// Error of a throw whose tip passes `beside` its simulated path (m).
     fn error_beside_m(&self, outcome: &ThrowOutcome, beside: Vector3<f64>) -> f64 {
         let closest = outcome.watched.to_point;
         let Some(closest) = closest.filter(|_| self.task.polishes()) else {
             return self.task.error_m(outcome).hypot(beside.norm());
         };
-        let velocity = Vector3::from(closest.velocity_m_s);
-        let along = velocity * (beside.dot(&velocity) / velocity.norm_squared().max(1e-12));
         let miss = Vector3::from(closest.tip_m) - Vector3::from(outcome.point_m);
-        (miss + beside - along).norm()
+        (miss + across(outcome, beside)).norm()
     }
+}
+
+/// The part of a displacement (m) that is across the tip's path at its closest: along it the tip
+/// is early or late, and nothing else.
+fn across(outcome: &ThrowOutcome, beside: Vector3<f64>) -> Vector3<f64> {
+    let velocity = outcome.watched.to_point.map(|c| c.velocity_m_s);
+    let velocity = Vector3::from(velocity.unwrap_or_default());
+    beside - velocity * (beside.dot(&velocity) / velocity.norm_squared().max(1e-12))
 }
 
 /// How far joint zeros that are off by `zeros` (rad) put the tip, at its closest, elsewhere (m).

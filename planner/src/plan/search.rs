@@ -125,7 +125,7 @@ impl Setup<'_> {
             let throws: Vec<_> = trajectories.iter().map(|t| (rope, t)).collect();
             let outcomes = self.searching.run(&throws)?;
             let valued = trajectories.iter().zip(&outcomes).map(|(t, o)| Valued {
-                fitness: self.fitness(rope, t, o),
+                fitness: self.fitness(rope, t, &self.widened(t, o)),
                 error_m: self.task.error_m(o),
                 success: o.finite && o.contacts.none() && self.task.judge(rope, o).success,
             });

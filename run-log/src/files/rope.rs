@@ -92,12 +92,12 @@ pub fn write_rope_estimate(
         estimate.out_of_distribution.is_flagged(),
         estimate.out_of_distribution.score
     )?;
-    if !unconfirmed.is_empty() {
-        writeln!(
-            text,
-            "unconfirmed = {}",
-            toml::Value::try_from(unconfirmed)?
-        )?;
+    let lists = [
+        ("warnings", &estimate.warnings[..]),
+        ("unconfirmed", unconfirmed),
+    ];
+    for (key, list) in lists.into_iter().filter(|(_, list)| !list.is_empty()) {
+        writeln!(text, "{key} = {}", toml::Value::try_from(list)?)?;
     }
     text.push_str(
         "\n# Mean and covariance in the order of the keys above; probability of 20 to 26 links.\n",
@@ -153,6 +153,7 @@ mod tests {
                 limit: 4.0,
                 reasons: Vec::new(),
             },
+            warnings: vec!["the clocks are apart".to_owned()],
         }
     }
 
@@ -174,5 +175,7 @@ mod tests {
         let covariance = table["posterior"]["covariance"].as_array().unwrap();
         assert_eq!(covariance.len(), 9);
         assert_eq!(table["fit"]["out_of_distribution"].as_bool(), Some(false));
+        let warnings = table["fit"]["warnings"].as_array().unwrap();
+        assert_eq!(warnings[0].as_str(), Some("the clocks are apart"));
     }
 }

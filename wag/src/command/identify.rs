@@ -149,6 +149,9 @@ fn beyond_in_words(rope: &RopeParams) -> Option<String> {
 
 /// What a person should know beside the numbers.
 fn print_remarks(estimate: &RopeEstimate) {
+    for warning in &estimate.warnings {
+        eprintln!("warning: {warning}");
+    }
     if let Some(beyond) = beyond_in_words(&estimate.params) {
         println!("{beyond}");
     }
@@ -171,8 +174,7 @@ fn print_remarks(estimate: &RopeEstimate) {
 }
 
 pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
-    let method = args.method;
-    let model = args.model.as_deref();
+    let (method, model) = (args.method, args.model.as_deref());
     no_model_without_network(method, model)?;
     let net = method.asks_network().then(|| network(model)).transpose()?;
     let config = config::here::<PlannerConfig>(None).or_input()?;
@@ -214,7 +216,7 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
         "rope": estimate.params, "std_dev": estimate.std_dev, "residual_px": estimate.residual_px,
         "simulations": estimate.simulations, "time_offset_s": estimate.time_offset_s,
         "method": estimate.method, "posterior": estimate.posterior,
-        "circumstances": estimate.circumstances, "warnings": observed.warnings,
+        "circumstances": estimate.circumstances, "warnings": ([observed.warnings, estimate.warnings].concat()),
         "unconfirmed": observed.track.unconfirmed,
         "out_of_distribution": estimate.out_of_distribution,
         "out_of_distribution_score": estimate.out_of_distribution.score,

@@ -109,8 +109,7 @@ impl Demo<'_> {
             tracked.ms_per_frame,
             100.0 * tracked.lost_fraction
         ));
-        let unconfirmed = tracked.unconfirmed.clone();
-        let appearance = tracked.appearance;
+        let (unconfirmed, appearance) = (tracked.unconfirmed.clone(), tracked.appearance);
         self.record.track = Some(tracked);
         let look = format!("look at `{overlay}`");
         confirm(&unconfirmed, accept_unconfirmed, &look)?;
@@ -148,6 +147,9 @@ impl Demo<'_> {
             "length {:.3} m, residual {:.2} px, {} simulations",
             rope.params.length_m, rope.residual_px, rope.simulations
         ));
+        for warning in &rope.warnings {
+            self.warn(warning);
+        }
         self.record.identified = Some(rope.clone());
         Ok(rope)
     }
