@@ -93,6 +93,9 @@ pub struct Aim {
     pub point_m: [f64; 3],
     /// How many misses have moved it.
     pub corrections: u32,
+    /// The last of them (m), tip minus target at the closest approach; none in files of before.
+    #[serde(default)]
+    pub miss_m: Option<[f64; 3]>,
 }
 
 /// A planned throw. JSON form: `plan.json`.

@@ -277,6 +277,9 @@ pub struct RopePosterior {
     /// (m): the tracker's noise, and what the model does not explain.
     #[serde(default)]
     pub residual_m: f64,
+    /// What the fit seems to have put into the camera's place or the length instead (m).
+    #[serde(default)]
+    pub absorbed_m: f64,
 }
 
 /// Noise of the keypoints in one direction, as found.
@@ -347,7 +350,8 @@ pub struct RopeEstimate {
     pub circumstances: FitCircumstances,
     /// Whether the rope is one of those the ranges know.
     pub out_of_distribution: OutOfDistribution,
-    /// What speaks against relying on it, each with a remedy.
+    /// What speaks against relying on it, each with what to do.
+    #[serde(default)]
     pub warnings: Vec<String>,
 }
 

@@ -11,11 +11,12 @@ use super::coordinates::{
     CLAMP, Coordinates, FRICTION, LENGTH, LINKS, Point, SLIP, link_range, middle_links,
     nearest_links,
 };
-use super::descent::{DescentRules, Iterate, best, descend, go_on};
+use super::descent::{DescentRules, best, descend, go_on};
 use super::error::IdentifyError;
 use super::film::{Fidelity, Film};
 use super::offsets;
 use super::refine::{Refined, SETTLED, refine};
+use super::steps::moved_px;
 
 /// Friction (1/m) and logarithm of its slip (1/m) at which the fit starts.
 const STARTS: [(f64, f64); 3] = [(0.02, -0.7), (0.3, -1.2), (0.5, 0.3)];
@@ -27,8 +28,8 @@ const PROMISE_MIN: f64 = 6.0;
 /// Least gain in cost (half of a sum of squared deviations). By chance nine numbers
 /// gain four or five; a real tracker's errors on nine films of plain ropes gained up to 42.
 const GAIN_MIN: f64 = 50.0;
-/// Cost by which another start may end above the best one and explain the film as well, and the
-/// lengths (m) from which it is another rope.
+/// Cost, over the inflation, by which another start may be above the best after the same steps and
+/// explain the film as well, and the difference of lengths (m) from which it is another rope.
 const RIVAL_COST: f64 = 2.0;
 const RIVAL_APART_M: f64 = 0.01;
 
@@ -72,7 +73,7 @@ pub(super) fn beyond(
         return Ok(plain);
     }
     let candidates = go_on(film, &coordinates, begun, &rules(CHOICE_STEPS), budget)?;
-    let rival_length_m = rival_length_m(&candidates);
+    let ends: Vec<(f64, f64)> = candidates.iter().map(|w| (w.cost, w.x[LENGTH])).collect();
     let chosen = best(candidates)?;
     let promise = plain_cost - chosen.cost;
     if promise < PROMISE_MIN {
@@ -93,7 +94,8 @@ pub(super) fn beyond(
     tracing::debug!(gain, inflation = found.inflation, x = ?found.x.as_slice(), "fit beyond the nine parameters");
     Ok(if gain > GAIN_MIN {
         Refined {
-            rival_length_m,
+            rival_length_m: rival_length_m(&ends, found.inflation, found.x[LENGTH]),
+            moved_px: moved_px(film, &found.x)?,
             ..found
         }
     } else {
@@ -101,14 +103,18 @@ pub(super) fn beyond(
     })
 }
 
-/// Length (m) of the start that ended farthest from the best one among those that explain the
-/// film as well; none where they agree.
-fn rival_length_m(candidates: &[Iterate]) -> Option<f64> {
-    let (best, others) = candidates.split_first()?;
-    let apart_m = |w: &&Iterate| (w.x[LENGTH] - best.x[LENGTH]).abs();
-    let equal = others.iter().filter(|w| w.cost < best.cost + RIVAL_COST);
-    let rival = equal.max_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
-    (apart_m(&rival) > RIVAL_APART_M).then_some(rival.x[LENGTH])
+/// Of starts that ended at a cost with a length (m) each, the best first: the length farthest from
+/// that of the fit among those that explain the film as well; none where they agree.
+fn rival_length_m(ends: &[(f64, f64)], inflation: f64, found_m: f64) -> Option<f64> {
+    let (least, _) = ends.first()?;
+    let equal = ends
+        .iter()
+        .filter(|(cost, _)| cost - least < RIVAL_COST * inflation);
+    let apart_m = |length_m: f64| (length_m - found_m).abs();
+    let rival_m = equal
+        .map(|(_, length_m)| *length_m)
+        .max_by(|a, b| apart_m(*a).total_cmp(&apart_m(*b)))?;
+    (apart_m(rival_m) > RIVAL_APART_M).then_some(rival_m)
 }
 
 /// What it costs a fit that its rope has a link count of the ranges, by what the fit with
@@ -118,4 +124,21 @@ fn counts_out_of_range(fit: &Refined, found: &Refined) -> f64 {
     let (low, high) = link_range();
     let inside = fit.x[LINKS].clamp(f64::from(low), f64::from(high));
     0.5 * (fit.x[LINKS] - inside).powi(2) / found.covariance[(LINKS, LINKS)].max(1e-9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rival_length_m;
+
+    #[test]
+    fn a_start_that_explains_the_film_as_well_by_another_length_is_a_rival() {
+        let ends = [(100.0, 0.50), (101.5, 0.53), (140.0, 0.70)];
+        assert_eq!(rival_length_m(&ends, 1.0, 0.501), Some(0.53));
+        // Worse by more than chance, or by no more than the film contradicts itself.
+        assert_eq!(rival_length_m(&ends[..1], 1.0, 0.501), None);
+        assert_eq!(rival_length_m(&[ends[0], ends[2]], 1.0, 0.501), None);
+        assert_eq!(rival_length_m(&ends, 30.0, 0.501), Some(0.70));
+        // The fit went on to where the other start was.
+        assert_eq!(rival_length_m(&[(100.0, 0.52), ends[1]], 1.0, 0.528), None);
+    }
 }

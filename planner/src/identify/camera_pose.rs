@@ -37,6 +37,11 @@ impl<'a> Viewer<'a> {
         }
     }
 
+    /// Distance of the point looked at (m).
+    pub(super) fn depth_m(&self) -> f64 {
+        self.depth_m
+    }
+
     /// Size of a pixel at the point looked at (m).
     pub(super) fn pixel_m(&self) -> f64 {
         self.depth_m / (self.camera.left.fx * self.camera.left.fy).sqrt()

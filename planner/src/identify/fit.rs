@@ -89,10 +89,11 @@ fn nearer(a: Refined, b: Refined) -> Refined {
     }
 }
 
-struct Fit<'a> {
-    film: Film<'a>,
-    clock: ClockWindow,
-    budget: Budget<'a>,
+/// One fit on its way.
+pub(super) struct Fit<'a> {
+    pub(super) film: Film<'a>,
+    pub(super) clock: ClockWindow,
+    pub(super) budget: Budget<'a>,
 }
 
 impl Fit<'_> {
@@ -120,7 +121,7 @@ impl Fit<'_> {
     }
 
     /// A start refined whose root mean square distance to the film is `distance_px`.
-    fn refine(
+    pub(super) fn refine(
         &mut self,
         coordinates: &Coordinates,
         start: &Point,

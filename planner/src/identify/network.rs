@@ -89,6 +89,7 @@ pub(super) fn estimate(
             ambiguities: unseen.map(ambiguity).collect(),
             inflation: 1.0,
             residual_m: distance_px * film.viewer.pixel_m(),
+            absorbed_m: 0.0,
         },
         // It fits neither noise nor camera.
         circumstances: FitCircumstances::default(),

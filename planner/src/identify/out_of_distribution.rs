@@ -36,7 +36,7 @@ pub(super) fn out_of_distribution(fit: &Refined) -> OutOfDistribution {
     let mut worst = f64::NEG_INFINITY;
     let mut reasons = Vec::new();
     for edge in edges(&fit.x) {
-        // A film that contradicts itself does not make its rope any more likely.
+        // That a film contradicts itself is no evidence that its rope is in the ranges.
         let inflation = fit.inflation.min(INFLATION_MAX);
         let variance = (fit.covariance * edge.slope).dot(&edge.slope).max(0.0) * inflation;
         let score = edge.value / variance.sqrt().hypot(edge.tolerance);

@@ -11,7 +11,7 @@ use super::centre::{Centre, Vector};
 use super::coordinates::{LINKS, Square, extras_of, link_range, parameter};
 use super::film::Film;
 use super::refine::Refined;
-use super::reliance::unexplained_m;
+use super::reliance::absorbed_m;
 use super::scale;
 use crate::observation::Appearance;
 use nalgebra::SMatrix;
@@ -210,7 +210,8 @@ fn summarise(draws: &[Draw], fit: &Refined, film: &Film<'_>) -> RopePosterior {
         links_probability,
         ambiguities: ambiguities(&covariance),
         inflation: fit.inflation,
-        residual_m: unexplained_m(fit, film),
+        residual_m: fit.at.distance_px * film.viewer.pixel_m(),
+        absorbed_m: absorbed_m(fit, film),
     }
 }
 

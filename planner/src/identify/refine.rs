@@ -37,6 +37,8 @@ pub(super) struct Refined {
     pub(super) inflation: f64,
     /// Length (m) of another rope that explains the film as well; none where all starts agree.
     pub(super) rival_length_m: Option<f64>,
+    /// How far keypoints move with the simulation's step halved (px, root mean square).
+    pub(super) moved_px: f64,
 }
 
 /// Refines the fit from a start.
@@ -83,6 +85,7 @@ pub(super) fn refine(
         noise,
         inflation,
         rival_length_m: None,
+        moved_px: 0.0,
     })
 }
 

@@ -25,8 +25,9 @@ pub(super) fn short_enough(
     mut fit: impl FnMut(&Film<'_>, Option<&Refined>) -> Result<Refined, IdentifyError>,
 ) -> Result<Refined, IdentifyError> {
     let mut found = fit(film, None)?;
-    for _ in 0..HALVINGS_MAX {
-        if moved_px(film, &found.x)? <= MOVED_MAX_PX {
+    for halvings in 0..=HALVINGS_MAX {
+        found.moved_px = moved_px(film, &found.x)?;
+        if found.moved_px <= MOVED_MAX_PX || halvings == HALVINGS_MAX {
             break;
         }
         film.options.step_s /= 2.0;
@@ -36,9 +37,14 @@ pub(super) fn short_enough(
     Ok(found)
 }
 
-/// Root mean square distance (px) by which keypoints move with the step halved; 0 where the
-/// rope cannot be simulated in half the steps either.
-fn moved_px(film: &Film<'_>, x: &Point) -> Result<f64, IdentifyError> {
+/// Whether the steps of a fit are too long for what it found, however often they were halved.
+pub(super) fn are_too_long(fit: &Refined) -> bool {
+    fit.moved_px > MOVED_MAX_PX
+}
+
+/// Root mean square distance (px) by which keypoints move with the step halved; infinite where
+/// one of the two could not be simulated as asked for.
+pub(super) fn moved_px(film: &Film<'_>, x: &Point) -> Result<f64, IdentifyError> {
     let rope = simulated_rope(x, nearest_links(x));
     let options = film.sim_options(Fidelity::Fine);
     let simulate = |step_s: &f64| {
@@ -51,9 +57,8 @@ fn moved_px(film: &Film<'_>, x: &Point) -> Result<f64, IdentifyError> {
     let both = both.into_iter().collect::<Result<Vec<_>, _>>()?;
     let (usual, finer) = (&both[0], &both[1]);
     Ok(match (usual.outcome, finer.outcome) {
-        (_, Outcome::Diverged) => 0.0,
-        (Outcome::Clean, _) => apart_px(film, x, &usual.nodes, &finer.nodes),
-        // What blew up was simulated in other steps than asked for.
+        (Outcome::Clean, Outcome::Clean) => apart_px(film, x, &usual.nodes, &finer.nodes),
+        // What blew up was simulated in other steps than asked for, if at all.
         _ => f64::INFINITY,
     })
 }

@@ -2,34 +2,48 @@
 
 use super::budget::Budget;
 use super::coordinates::{
-    DAMPING, LEAD_RADIUS, LENGTH, LINKS, PLAIN, Point, Reach, STIFFNESS, Square, parameter,
-    point_of,
+    CAMERA, CLOCK, DAMPING, LEAD_RADIUS, LENGTH, LINKS, PLAIN, Point, Reach, STIFFNESS, Square,
+    parameter, point_of,
 };
 use super::film::{Fidelity, Film};
+use super::fit::Fit;
 use super::noise::{Noise, RESIDUAL};
 use super::offsets;
 use super::options::IdentifyOptions;
+use super::out_of_distribution::out_of_distribution;
 use super::posterior::posterior;
 use super::refine::{Refined, refine};
-use super::steps::short_enough;
+use super::reliance;
+use super::steps::are_too_long;
 use crate::observation::{Appearance, Observation, ObservedPoints};
 use crate::ropes::{random_rope, trial_rope};
 use crate::synthetic::{FilmNoise, FilmTiming, film, side_camera};
 use crate::wiggle::{WiggleConfig, wiggling_arm};
+use arm_model::{JointTrajectory, Pole};
+use rope_sim::PlannedArm;
 use shared_types::RopeParams;
 use shared_types::rope::RANGES;
 use std::ops::ControlFlow;
 
-fn with_film<T>(rope: &RopeParams, look: impl FnOnce(&mut Film<'_>, &mut Budget<'_>) -> T) -> T {
+fn with_film<T>(rope: &RopeParams, look: impl FnOnce(Film<'_>, &mut Budget<'_>) -> T) -> T {
     let arm = wiggling_arm(&WiggleConfig::default()).unwrap();
+    with_film_of(&arm, &FilmTiming::default(), rope, look)
+}
+
+/// A film of a rope that an arm moves.
+fn with_film_of<T>(
+    arm: &PlannedArm,
+    timing: &FilmTiming,
+    rope: &RopeParams,
+    look: impl FnOnce(Film<'_>, &mut Budget<'_>) -> T,
+) -> T {
     let camera = side_camera();
-    let (timing, noise) = (FilmTiming::default(), FilmNoise::default());
-    let filmed = film(rope, &arm, &camera, 24, &timing, &noise).unwrap();
+    let filmed = film(rope, arm, &camera, 24, timing, &FilmNoise::default()).unwrap();
     let observation = Observation {
         track: &filmed.track,
         points: ObservedPoints::ArcLength,
         camera: &camera,
-        motion: &arm,
+        motion: arm,
         appearance: Appearance::default(),
     };
     let options = IdentifyOptions {
@@ -44,7 +58,7 @@ fn with_film<T>(rope: &RopeParams, look: impl FnOnce(&mut Film<'_>, &mut Budget<
         steps_max: 30,
         progress: &mut |_| ControlFlow::Continue(()),
     };
-    look(&mut Film::new(&observation, &options), &mut budget)
+    look(Film::new(&observation, &options), &mut budget)
 }
 
 fn refined(film: &Film<'_>, reach: Reach, start: &Point, budget: &mut Budget<'_>) -> Refined {
@@ -54,13 +68,29 @@ fn refined(film: &Film<'_>, reach: Reach, start: &Point, budget: &mut Budget<'_>
 
 /// A fit from the rope's own parameters on: how far it ends from them, and in which steps (s).
 fn fitted(rope: &RopeParams) -> (Point, f64) {
+    let arm = wiggling_arm(&WiggleConfig::default()).unwrap();
+    fitted_to(&arm, &FilmTiming::default(), rope)
+}
+
+fn fitted_to(arm: &PlannedArm, timing: &FilmTiming, rope: &RopeParams) -> (Point, f64) {
     let truth = point_of(rope);
-    with_film(rope, |film, budget| {
-        let found = short_enough(film, |film, from| {
-            let start = from.map_or(&truth, |from| &from.x);
-            Ok(refined(film, Reach::Wide, start, budget))
-        });
-        (found.unwrap().x - truth, film.options.step_s)
+    with_film_of(arm, timing, rope, |film, _| {
+        let clock = film.clock_window();
+        let coordinates = film.coordinates(clock, Reach::Wide);
+        let go_on = &mut |_| ControlFlow::Continue(());
+        let mut fit = Fit {
+            film,
+            clock,
+            budget: Budget {
+                simulations: 0,
+                steps: 0,
+                steps_max: 30,
+                progress: go_on,
+            },
+        };
+        let found = fit.refine(&coordinates, &truth, 0.1).unwrap();
+        assert!(!are_too_long(&found));
+        (found.x - truth, fit.film.options.step_s)
     })
 }
 
@@ -85,6 +115,108 @@ fn a_slack_heavy_rope_is_fitted_in_shorter_steps_and_a_rope_of_the_ranges_is_not
     );
 }
 
+/// A throw takes the tip through more than a wiggle does.
+#[test]
+fn a_throw_is_fitted_in_the_steps_that_it_needs() {
+    let start = wiggling_arm(&WiggleConfig::default())
+        .unwrap()
+        .trajectory()
+        .start();
+    let knots = [0.0, 0.5, -0.4, 0.0].map(|swing| {
+        let mut q = start;
+        q[1] += 0.6 * swing;
+        q[3] -= swing;
+        q
+    });
+    let trajectory = JointTrajectory::new(&[0.0, 0.35, 0.7, 1.1], &knots).unwrap();
+    let arm = PlannedArm::new(trajectory, Pole::default());
+    let timing = FilmTiming {
+        frames: 80,
+        ..FilmTiming::default()
+    };
+    let usual_s = IdentifyOptions::default().step_s;
+    let rope = trial_rope(2, 9);
+    let (off, step_s) = fitted_to(&arm, &timing, &rope);
+    assert_eq!(step_s, usual_s);
+    assert!(off[LENGTH].abs() < 1e-3, "{off}");
+    let heavy = RopeParams {
+        joint_stiffness_nm_per_rad: 0.02,
+        joint_damping_nms_per_rad: 1e-3,
+        mass_per_length_kg_per_m: 0.15,
+        ..trial_rope(2, 8)
+    };
+    let (_, wiggled_s) = fitted(&heavy);
+    let (off, thrown_s) = fitted_to(&arm, &timing, &heavy);
+    assert!(thrown_s < wiggled_s, "{thrown_s} {wiggled_s}");
+    assert!(off[LENGTH].abs() < 3e-3, "{off}");
+}
+
+/// What went into other numbers than the residual is said, and counts as unexplained.
+#[test]
+fn what_speaks_against_a_fit_is_said_and_counted() {
+    let rope = random_rope(4);
+    with_film(&rope, |film, budget| {
+        let fit = refined(&film, Reach::Ranges, &point_of(&rope), budget);
+        let clock = film.clock_window();
+        let said = |fit: &Refined| reliance::warnings(fit, &film, clock).join("; ");
+        let absorbed_m = |fit: &Refined| reliance::absorbed_m(fit, &film);
+        assert_eq!((said(&fit), absorbed_m(&fit)), (String::new(), 0.0));
+        let (position_m, look_at_m) = (
+            film.options.camera_position_std_m,
+            film.options.camera_look_at_std_m,
+        );
+        let mut moved = fit.clone();
+        moved.x[CAMERA] = 2.0 * position_m;
+        assert_eq!((said(&moved), absorbed_m(&moved)), (String::new(), 0.0));
+        moved.x[CAMERA] = 5.0 * position_m;
+        assert!(said(&moved).contains("a camera 5.0 standard deviations"));
+        let parallax_m = 2.0 * position_m * fit.x[LENGTH] / film.viewer.depth_m();
+        assert!((absorbed_m(&moved) - parallax_m).abs() < 1e-12);
+        moved.x[CAMERA + 3] = -5.0 * look_at_m;
+        let both_m = parallax_m.hypot(2.0 * look_at_m);
+        assert!((absorbed_m(&moved) - both_m).abs() < 1e-12);
+        let mut late = fit.clone();
+        late.x[CLOCK] = clock.offset_s - clock.half_width_s;
+        assert!(said(&late).contains("clocks of arm and camera"));
+        let noisy = Refined {
+            noise: Noise::white(1.6),
+            ..fit.clone()
+        };
+        assert!(said(&noisy).contains("1.6 px of the keypoints"));
+        let torn = Refined {
+            inflation: 36.0,
+            ..fit.clone()
+        };
+        assert!(said(&torn).contains("contradict each other 6 times"));
+        let other = Refined {
+            rival_length_m: Some(fit.x[LENGTH] + 0.04),
+            ..fit.clone()
+        };
+        assert!(said(&other).contains("explain the film about equally well"));
+        assert!((absorbed_m(&other) - 0.02).abs() < 1e-12);
+        let slack = Refined {
+            moved_px: 0.5,
+            ..fit.clone()
+        };
+        assert!(said(&slack).contains("steps are too long"));
+    });
+}
+
+/// A rope outside the ranges stays outside when its film contradicts itself.
+#[test]
+fn a_film_that_contradicts_itself_does_not_make_its_rope_likelier() {
+    let rope = RopeParams {
+        length_m: RANGES[parameter::LENGTH].max + 0.05,
+        ..random_rope(2)
+    };
+    with_film(&rope, |film, budget| {
+        let mut fit = refined(&film, Reach::Wide, &point_of(&rope), budget);
+        assert!(out_of_distribution(&fit).is_flagged());
+        fit.inflation = 1e4;
+        assert!(out_of_distribution(&fit).is_flagged());
+    });
+}
+
 /// A rope a centimetre longer than the ranges know, whose film seems to contradict itself:
 /// all within the ranges is a centimetre off, but not unlikely.
 #[test]
@@ -94,10 +226,10 @@ fn a_film_that_contradicts_itself_still_gets_the_rope_that_fits_it() {
         ..random_rope(2)
     };
     with_film(&rope, |film, budget| {
-        let mut fit = refined(film, Reach::Ranges, &point_of(&rope), budget);
+        let mut fit = refined(&film, Reach::Ranges, &point_of(&rope), budget);
         for inflation in [1.0, 1e3, 1e4, 1e5] {
             fit.inflation = inflation;
-            let (params, posterior) = posterior(&fit, film);
+            let (params, posterior) = posterior(&fit, &film);
             let off_m = params.length_m - rope.length_m;
             assert!(off_m.abs() < 1e-3, "{inflation}: {off_m}");
             let is_within = posterior.interval_90[parameter::LENGTH][1] < 0.65;
@@ -117,7 +249,7 @@ fn every_reported_rope_can_be_one() {
         ..random_rope(1)
     };
     with_film(&rope, |film, budget| {
-        let mut fit = refined(film, Reach::Wide, &point_of(&rope), budget);
+        let mut fit = refined(&film, Reach::Wide, &point_of(&rope), budget);
         (fit.x[LINKS], fit.x[LEAD_RADIUS]) = (32.0, 0.003);
         (
             fit.covariance[(LINKS, LINKS)],
@@ -126,7 +258,7 @@ fn every_reported_rope_can_be_one() {
         for (i, k) in [(LINKS, LEAD_RADIUS), (LEAD_RADIUS, LINKS)] {
             fit.covariance[(i, k)] = 0.9 * 2.0 * 0.02;
         }
-        let (params, posterior) = posterior(&fit, film);
+        let (params, posterior) = posterior(&fit, &film);
         assert!(params.validate().is_ok(), "{params:?}");
         assert!((params.length_m - rope.length_m).abs() < 2e-3, "{params:?}");
         assert!(posterior.interval_90[parameter::LEAD_RADIUS][0] > 0.0);
@@ -140,13 +272,13 @@ fn lasting_errors_widen_a_fit_by_how_far_they_move_it() {
     const OFFSET_PX: f64 = 0.05;
     let rope = random_rope(3);
     with_film(&rope, |film, budget| {
-        let fit = refined(film, Reach::Ranges, &point_of(&rope), budget);
+        let fit = refined(&film, Reach::Ranges, &point_of(&rope), budget);
         let coordinates = film.coordinates(film.clock_window(), Reach::Ranges);
         let noise = Noise::white(0.3);
         let at = |rows| {
             let mut at = fit.at.clone();
             at.rows = rows;
-            at.normal(film, Fidelity::Fine, &noise)
+            at.normal(&film, Fidelity::Fine, &noise)
         };
         let still = at(fit.at.rows.clone());
         let information = still.information + coordinates.prior_information();
@@ -165,7 +297,7 @@ fn lasting_errors_widen_a_fit_by_how_far_they_move_it() {
         }
         let of = |std_px| {
             let rows = (&fit.at.rows, PLAIN);
-            offsets::covariance(rows, &covariance, film, &noise, std_px)
+            offsets::covariance(rows, &covariance, &film, &noise, std_px)
         };
         let found = of(OFFSET_PX);
         assert!(moved[(LENGTH, LENGTH)] > 0.0);

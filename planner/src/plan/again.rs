@@ -37,7 +37,7 @@ const ROUNDS: usize = 4;
 ///
 /// # Errors
 /// As [`plan`](super::plan); another task than a strike, a `last` of other joints or waypoints
-/// than the request's, a miss that is none of this throw.
+/// than the request's, a miss that is none of this throw, or that `last` already corrected.
 pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Result<Plan, PlanError> {
     let (ThrowGoal::Strike(strike), Task::Strike) = (&request.goal, last.task) else {
         return refused("only strikes are corrected by their miss: plan a lob or a drape anew");
@@ -61,6 +61,11 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
             100.0 * miss_length_m,
             100.0 * MISS_MAX_M
         ));
+    }
+    if last.aim.is_some_and(|aim| aim.miss_m == Some(miss_m)) {
+        return refused(
+            "the last throw already corrected this miss: score the film of that throw, not of the one before (if it did miss by the same, give --miss to a tenth of a millimetre)",
+        );
     }
     let (aimed_m, corrections) =
         (last.aim).map_or((last.target_m, 0), |a| (a.point_m, a.corrections));
@@ -122,6 +127,7 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
         aim: Some(Aim {
             point_m: aim.target_m,
             corrections: corrections + 1,
+            miss_m: Some(miss_m),
         }),
         unconfirmed: last.unconfirmed.clone(),
         ..setup.finish(chosen, count)?
@@ -322,6 +328,13 @@ mod tests {
         };
         assert!(refused(&strike, [0.2, 0.0, 0.0]).contains("20.0 cm is too far"));
         assert!(refused(&strike, [f64::NAN, 0.0, 0.0]).contains("too far"));
+        let miss_m = [0.01, 0.0, -0.005];
+        let corrected = plan_again(&strike, &thrown, miss_m).unwrap();
+        let error = plan_again(&strike, &corrected, miss_m).unwrap_err();
+        assert!(
+            error.to_string().contains("already corrected this miss"),
+            "{error}"
+        );
         let mut lob = strike.clone();
         lob.goal = PlannerConfig::default().goal(Task::Lob, thrown.target_m);
         assert!(refused(&lob, [0.01, 0.0, 0.0]).contains("only strikes"));

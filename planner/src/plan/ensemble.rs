@@ -73,7 +73,8 @@ impl PosteriorEnsemble {
             optimised,
             undrawn: u32::try_from(forecast - drawn.len()).unwrap_or(u32::MAX),
             forecast: drawn,
-            discrepancy_m: DISCREPANCY_PER_RESIDUAL * posterior.residual_m,
+            discrepancy_m: (DISCREPANCY_PER_RESIDUAL * posterior.residual_m)
+                .hypot(posterior.absorbed_m),
             joint_zero_std_rad: JOINT_ZERO_STD_RAD,
         }
     }
@@ -181,6 +182,7 @@ mod tests {
             ambiguities: Vec::new(),
             inflation: 1.0,
             residual_m: 0.0,
+            absorbed_m: 0.0,
         };
         let drawn = PosteriorEnsemble::drawn(&rope, &posterior, 3995, 5, 1);
         let drawn = [drawn.optimised, drawn.forecast].concat();
@@ -221,6 +223,7 @@ mod tests {
             ambiguities: Vec::new(),
             inflation: 1.0,
             residual_m: 0.0,
+            absorbed_m: 0.0,
         }
     }
 
@@ -285,7 +288,11 @@ mod tests {
         let mut posterior = posterior_of(&[rope]);
         posterior.mean[7] = 0.4;
         posterior.covariance[7][7] = 0.16;
+        (posterior.residual_m, posterior.absorbed_m) = (0.002, 0.012);
         let drawn = PosteriorEnsemble::drawn(&rope, &posterior, 20, 200, 1);
+        // Two and a half residuals, and what went elsewhere.
+        assert!((drawn.discrepancy_m - 0.013).abs() < 1e-12, "{drawn:?}");
+        assert_eq!(drawn.joint_zero_std_rad, 3e-3);
         let ropes = [&drawn.optimised[..], &drawn.forecast].concat();
         assert_eq!((ropes.len(), drawn.undrawn), (220, 0));
         for (i, drawn) in ropes.iter().enumerate() {

@@ -124,6 +124,8 @@ impl Setup<'_> {
             let beside = across(outcome, displaced_m(trajectory, &zeros, outcome));
             square_m2 += beside.norm_squared();
         }
+        // The mean of the square of a size that is known to so much.
+        square_m2 *= (2.0 * SCALE_LOG_STD.powi(2)).exp();
         ThrowOutcome {
             closest_m: outcome.closest_m.hypot(square_m2.sqrt()),
             ..outcome.clone()

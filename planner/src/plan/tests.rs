@@ -94,6 +94,66 @@ fn a_robust_plan_is_no_riskier_than_the_throw_it_starts_from() {
     assert!(robust <= plain, "{robust} after {plain}");
 }
 
+/// A throw that is right for the rope planned for: what a forecast adds is all that it says.
+#[test]
+fn a_forecast_allows_for_all_that_is_not_known() {
+    let mut r = request([0.95, 0.25, 0.1]);
+    let thrown = plan(&r, &mut go_on).unwrap();
+    r.ensemble.forecast = vec![r.rope; 32];
+    let forecast = |ensemble: PosteriorEnsemble| {
+        let r = PlanRequest {
+            ensemble,
+            ..r.clone()
+        };
+        let setup = Setup::new(r.goal.task(), &r).unwrap();
+        setup.forecast(&thrown.trajectory).unwrap().unwrap()
+    };
+    let sure = r.ensemble.clone();
+    assert!(forecast(sure.clone()).interval_90_m[1] < 1e-3);
+    let unexplained = PosteriorEnsemble {
+        discrepancy_m: 0.01,
+        ..sure.clone()
+    };
+    // Two normal errors of 1 cm across the path: 1.18 cm in the median.
+    let median_m = forecast(unexplained).median_m;
+    assert!((median_m - 0.0118).abs() < 0.001, "{median_m}");
+    let zeros = PosteriorEnsemble {
+        joint_zero_std_rad: 3e-3,
+        ..sure.clone()
+    };
+    let median_m = forecast(zeros).median_m;
+    assert!((0.002..0.007).contains(&median_m), "{median_m}");
+    let undrawn = forecast(PosteriorEnsemble { undrawn: 8, ..sure });
+    assert_eq!((undrawn.ropes, undrawn.failed), (40, 8));
+    assert!(undrawn.interval_90_m[1] >= r.rope.length_m);
+}
+
+/// What zeros of the joints and the model leave open counts in the risk of a robust throw.
+#[test]
+fn risk_counts_what_the_ropes_do_not_show() {
+    let mut r = request([0.95, 0.25, 0.1]);
+    let thrown = plan(&r, &mut go_on).unwrap();
+    r.ensemble.optimised = vec![r.rope; 2];
+    let risk_m = |joint_zero_std_rad: f64, discrepancy_m: f64| {
+        let mut r = r.clone();
+        r.ensemble.joint_zero_std_rad = joint_zero_std_rad;
+        r.ensemble.discrepancy_m = discrepancy_m;
+        let setup = Setup::new(r.goal.task(), &r).unwrap();
+        setup.risks(&[thrown.trajectory]).unwrap()[0].fitness
+    };
+    let sure = risk_m(0.0, 0.0);
+    // Mean and three times the worst fifth of `d - 1 / (1 + d)`: eight times a small distance.
+    let zeros_m = (risk_m(3e-3, 0.0) - sure) / 8.0;
+    assert!((0.002..0.006).contains(&zeros_m), "{zeros_m}");
+    // Only what is across the path counts: two of three directions, of a size known to 30 %.
+    let unexplained_m = (risk_m(0.0, 0.01) - sure) / 8.0;
+    let expected_m = 0.01 * (2.0 * (2.0 * 0.3_f64.powi(2)).exp()).sqrt();
+    assert!(
+        (unexplained_m / expected_m - 1.0).abs() < 0.03,
+        "{unexplained_m}"
+    );
+}
+
 /// Byte for byte, as it would be written down.
 #[test]
 fn same_plan_for_one_two_and_four_threads() {
@@ -187,6 +247,34 @@ fn an_interrupted_search_leaves_the_best_so_far() {
     assert_eq!(generations, 2);
     assert!(found.interrupted && found.predicted_error_m < 0.3);
     assert!(found.margins.iter().all(|m| m.left >= 0.0));
+}
+
+/// Each in a sentence, and none of a plan that has nothing of it.
+#[test]
+fn everything_to_know_before_a_throw_is_said() {
+    let r = request([0.95, 0.25, 0.1]);
+    let mut found = plan(&r, &mut go_on).unwrap();
+    assert_eq!(warnings(&found), Vec::<String>::new());
+    found.interrupted = true;
+    found.predicted_error_m = 0.03;
+    found.rope.lead_radius_m = 0.2;
+    found.forecast = Some(shared_types::ErrorForecast {
+        ropes: 64,
+        failed: 3,
+        mean_m: 0.01,
+        median_m: 0.01,
+        interval_90_m: [0.0, 0.02],
+    });
+    let said = warnings(&found).join("; ");
+    for part in [
+        "miss the target by 3.0 cm",
+        "interrupted",
+        "3 of 64 ropes",
+        "up to 2.0 cm",
+        "`lead_radius_m` is 0.2",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
 }
 
 /// Scenes stand on the target's bearing, and warm starts are throws the arm can make.

@@ -2,9 +2,10 @@
 //!
 //! A shard is a function of the recipe (seed, ropes, wiggle, keypoints) and its
 //! number alone: shards can be made in any order, on several machines, and again
-//! after an interruption. A shard file begins with the recipe's hash and ends with
-//! a checksum, and is written whole or not at all. Positions are kept in units of
-//! 1/16384 m (61 µm, a fiftieth of a pixel).
+//! after an interruption. A shard file begins with the recipe's hash and the path of one
+//! rope's tip, by which a shard of another simulator is known, ends with a checksum, and is
+//! written whole or not at all. Positions are kept in units of 1/16384 m (61 µm, a fiftieth
+//! of a pixel).
 
 use crate::config::DataConfig;
 use crate::error::{Result, TrainingError};
@@ -22,10 +23,18 @@ use std::path::{Path, PathBuf};
 
 /// Ropes in a shard.
 pub(crate) const SHARD_ROPES: usize = 1000;
-const MAGIC: &[u8; 8] = b"WAGPOOL1";
+const MAGIC: &[u8; 8] = b"WAGPOOL2";
 const UNITS_PER_M: f32 = 16384.0;
 /// Bytes of a rope: its parameters, and whether its simulation stayed finite.
 const ROPE: usize = 8 * ROPE_PARAMETERS + 1;
+/// Places of a tip that tell one simulator from another, uniform in time.
+const PROBE_POINTS: usize = 32;
+/// Distance in each direction below which they are the same (m). A processor without vectors of
+/// single precision simulates in double precision, which ends up to 0.13 mm elsewhere.
+const PROBE_TOLERANCE_M: f32 = 2e-4;
+
+/// The tip's path of one rope under the recipe's wiggle (m).
+type Probe = [f32; 3 * PROBE_POINTS];
 
 /// What is simulated.
 #[derive(Debug, Clone)]
@@ -70,7 +79,7 @@ impl Recipe {
         first..(first + SHARD_ROPES).min(self.ropes())
     }
 
-    /// Hash of everything that decides the ropes' motions, but for the simulator.
+    /// Hash of everything that decides the ropes' motions, but for the simulator: see [`Self::probe`].
     fn hash(&self) -> [u8; 32] {
         let (data, share, version) = (&self.data, self.share, env!("CARGO_PKG_VERSION"));
         let o = &self.options;
@@ -83,6 +92,25 @@ impl Recipe {
         let ropes = self.range(shard);
         let numbers = [ropes.start, ropes.len()].map(|n| (n as u32).to_le_bytes());
         [&MAGIC[..], &self.hash(), &numbers.concat()].concat()
+    }
+
+    /// What this program's simulator makes of the recipe's first rope.
+    fn probe(&self) -> Result<Probe> {
+        let arm = wiggling_arm(&self.data.wiggle)?;
+        let rope = Hypercube::new(self.data.seed, self.share, self.ropes()).rope(0);
+        let options = RecordOptions {
+            layout: KeypointLayout::Uniform(2),
+            ..self.options
+        };
+        let films = record(&[rope], &arm, &options)?;
+        let path = films.first().map_or(&[][..], |film| &film.positions_m);
+        let samples = path.len() / 6;
+        Ok(core::array::from_fn(|i| {
+            let sample = i / 3 * samples / PROBE_POINTS;
+            path.get(6 * sample + 3 + i % 3)
+                .copied()
+                .unwrap_or(f32::NAN)
+        }))
     }
 
     fn path(&self, folder: &Path, shard: usize) -> PathBuf {
@@ -116,10 +144,12 @@ impl Recipe {
         shards: Range<usize>,
         progress: &mut dyn FnMut(usize),
     ) -> Result<()> {
+        let probe = self.probe()?;
         for shard in shards {
             let path = self.path(folder, shard);
-            if self.load_shard(&path, shard).is_err() {
-                write_whole(&path, &self.simulate(shard)?.to_bytes(self, shard))?;
+            if self.load_shard(&path, shard, &probe).is_err() {
+                let made = self.simulate(shard)?;
+                write_whole(&path, &made.to_bytes(self, shard, &probe))?;
             }
             progress(shard);
         }
@@ -128,10 +158,10 @@ impl Recipe {
 
     /// Loads all shards.
     pub(crate) fn load(&self, folder: &Path) -> Result<Pool> {
-        let mut pool = self.empty();
+        let (mut pool, probe) = (self.empty(), self.probe()?);
         for shard in 0..self.shards() {
             let path = self.path(folder, shard);
-            pool.append(self.load_shard(&path, shard)?);
+            pool.append(self.load_shard(&path, shard, &probe)?);
         }
         Ok(pool)
     }
@@ -146,9 +176,9 @@ impl Recipe {
         }
     }
 
-    fn load_shard(&self, path: &Path, shard: usize) -> Result<Pool> {
+    fn load_shard(&self, path: &Path, shard: usize, probe: &Probe) -> Result<Pool> {
         let bytes = read(path)?;
-        Pool::from_bytes(&bytes, self, shard).map_err(|reason| {
+        Pool::from_bytes(&bytes, self, shard, probe).map_err(|reason| {
             let reason = format!("{reason}: run `phi-train dataset` again to replace it");
             TrainingError::file(path, reason)
         })
@@ -233,9 +263,10 @@ impl Pool {
         self.positions.extend(other.positions);
     }
 
-    fn to_bytes(&self, recipe: &Recipe, shard: usize) -> Vec<u8> {
+    fn to_bytes(&self, recipe: &Recipe, shard: usize, probe: &Probe) -> Vec<u8> {
         let samples = self.positions.len() / (self.len().max(1) * self.keypoints * 3);
         let mut out = recipe.header(shard);
+        out.extend(probe.iter().flat_map(|x| x.to_le_bytes()));
         out.extend(
             [samples, self.keypoints]
                 .map(|n| (n as u32).to_le_bytes())
@@ -250,6 +281,7 @@ impl Pool {
         bytes: &[u8],
         recipe: &Recipe,
         shard: usize,
+        probe: &Probe,
     ) -> core::result::Result<Self, &'static str> {
         const CUT: &str = "cut short or damaged";
         let body = unsealed(bytes).ok_or(CUT)?;
@@ -260,6 +292,17 @@ impl Pool {
         let body = body
             .strip_prefix(&header[..])
             .ok_or("another shard under this name")?;
+        let (made, body) = body.split_at_checked(4 * probe.len()).ok_or(CUT)?;
+        let (made, _) = made.as_chunks::<4>();
+        let apart_m = |(made, now): (&[u8; 4], &f32)| (f32::from_le_bytes(*made) - now).abs();
+        if !made
+            .iter()
+            .zip(probe)
+            .map(apart_m)
+            .all(|m| m < PROBE_TOLERANCE_M)
+        {
+            return Err("made by another simulator");
+        }
         let (sizes, body) = body.split_first_chunk::<8>().ok_or(CUT)?;
         let [samples, keypoints] = [0, 4].map(|i| {
             let number = [sizes[i], sizes[i + 1], sizes[i + 2], sizes[i + 3]];
@@ -357,6 +400,14 @@ mod tests {
             let refused = recipe.load(folder.path()).unwrap_err();
             assert!(refused.to_string().contains("dataset"), "{refused}");
         }
+        recipe.make(folder.path(), 0..1, &mut |_| ()).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), good);
+        let mut foreign = recipe.probe().unwrap();
+        foreign[40] += 3e-4;
+        let foreign = recipe.simulate(0).unwrap().to_bytes(&recipe, 0, &foreign);
+        std::fs::write(&path, foreign).unwrap();
+        let refused = recipe.load(folder.path()).unwrap_err().to_string();
+        assert!(refused.contains("another simulator"), "{refused}");
         recipe.make(folder.path(), 0..1, &mut |_| ()).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), good);
         let other = DataConfig { seed: 5, ..data() };

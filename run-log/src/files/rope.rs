@@ -146,6 +146,7 @@ mod tests {
                 }],
                 inflation: 1.0,
                 residual_m: 0.0,
+                absorbed_m: 0.0,
             },
             circumstances: FitCircumstances::default(),
             out_of_distribution: OutOfDistribution {

@@ -1,7 +1,7 @@
 //! `wag identify` on films of simulated ropes, from files to files: what it says of ropes
 //! inside the ranges and outside.
 
-use super::support::{calibrate, has, said, wag_in};
+use super::support::{are_refused_in, calibrate, has, said, wag_in};
 use arm_model::Limits;
 use arm_model::Pole;
 use camera_ingest::calib::VideoMode;
@@ -58,6 +58,29 @@ fn identified(rope: &RopeParams, index: u64) -> (String, toml::Table) {
     let file = std::fs::read_to_string(folder.path().join("rope.toml")).unwrap();
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     (printed, file.parse().unwrap())
+}
+
+/// A track that is not to be relied on, and joints that end before the film does.
+#[test]
+fn films_that_tell_too_little_are_refused_before_any_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    film(&trial_rope(SEED, 0), 0, folder.path());
+    let at = |name: &str| folder.path().join(name);
+    let joints = std::fs::read_to_string(at("joints.csv")).unwrap();
+    let begin: Vec<&str> = joints.lines().take(51).collect();
+    std::fs::write(at("short.csv"), begin.join("\n")).unwrap();
+    let command = "identify --keypoints keypoints.json --camera camera.toml --out rope.toml";
+    let case = format!("{command} --joints short.csv => short.csv | the film lasts");
+    are_refused_in(folder.path(), 2, &case);
+    let track = std::fs::read_to_string(at("keypoints.json")).unwrap();
+    let mut track: serde_json::Value = serde_json::from_str(&track).unwrap();
+    track["unconfirmed"] = serde_json::json!(["the rope's end is not confirmed"]);
+    std::fs::write(at("keypoints.json"), track.to_string()).unwrap();
+    let case = format!(
+        "{command} --joints joints.csv => the rope's end is not confirmed | --accept-unconfirmed"
+    );
+    are_refused_in(folder.path(), 1, &case);
+    assert!(!at("rope.toml").exists());
 }
 
 #[test]

@@ -28,6 +28,8 @@ pub struct KernelRow {
     still_ns: f64,
     /// Every rope on an arm spline of its own, kinematics included.
     throw_ns: f64,
+    /// The same throws of ropes with friction, a rest curvature and a clamp of its own.
+    real_throw_ns: f64,
     /// As `still_ns`, with a floor in the scene that the rope never comes near.
     floor_far_ns: f64,
     /// Ropes let go level 0.3 m above a floor, to fall and lie on it.
@@ -36,11 +38,14 @@ pub struct KernelRow {
     simulated_s_per_cpu_s: f64,
 }
 
-pub const TABLE: [Column<KernelRow>; 7] = [
+pub const TABLE: [Column<KernelRow>; 8] = [
     ("kernel", |row| row.kernel.clone()),
     ("ropes side by side", |row| row.lanes.to_string()),
     ("frame still (ns)", |row| format!("{:.0}", row.still_ns)),
     ("arm spline each (ns)", |row| format!("{:.0}", row.throw_ns)),
+    ("with friction and curvature (ns)", |row| {
+        format!("{:.0}", row.real_throw_ns)
+    }),
     ("floor far below (ns)", |row| {
         format!("{:.0}", row.floor_far_ns)
     }),
@@ -84,6 +89,8 @@ fn measure_one(
     let standing = workload.on(&workload.still, count);
     let still_ns = cost_ns(&Scene::EMPTY, &standing, &swinging)?;
     let throw_ns = cost_ns(&Scene::EMPTY, &workload.throwing(count), &throwing)?;
+    let real = workload.throwing_with(&workload.real, count);
+    let real_throw_ns = cost_ns(&Scene::EMPTY, &real, &throwing)?;
     let floor_far_ns = cost_ns(&workload.floor(FAR_BELOW_M), &standing, &swinging)?;
     let on_floor_ns = cost_ns(&workload.floor(BELOW_M), &standing, &falling)?;
     let single = kernel.is_single_precision();
@@ -94,6 +101,7 @@ fn measure_one(
         links: LINKS,
         still_ns,
         throw_ns,
+        real_throw_ns,
         floor_far_ns,
         on_floor_ns,
         simulated_s_per_cpu_s: throwing.step_s / (1e-9 * throw_ns),

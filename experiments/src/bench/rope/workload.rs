@@ -9,8 +9,8 @@ use rope_sim::{
     AttachMotion, Candidate, Kernel, Obstacle, PlannedArm, Precision, Rollout, Scene, SimOptions,
     SimulateError, Start, Watch, roll_out_in_with,
 };
-use shared_types::RopeParams;
 use shared_types::rope::RANGES;
+use shared_types::{BendingFriction, RopeExtras, RopeParams};
 
 /// Links of a typical rope.
 pub const LINKS: u32 = 22;
@@ -30,6 +30,8 @@ const FRICTION: f64 = 0.5;
 pub struct Workload {
     /// Uniform in the parameter ranges, all with [`LINKS`] links.
     pub ropes: Vec<RopeParams>,
+    /// The same with a rest curvature, friction in bending and a clamp of its own stiffness.
+    pub real: Vec<RopeParams>,
     /// A spline of its own for every candidate: seven waypoints 0.15 s apart, joints 2,
     /// 4 and 6 walking at random by up to 0.15 rad, then held.
     pub throws: Vec<PlannedArm>,
@@ -43,12 +45,13 @@ impl Workload {
     /// Draws everything from `seed`.
     pub fn new(seed: u64) -> Result<Self, TrajectoryError> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let ropes = (0..ROPES).map(|_| rope(&mut random)).collect();
+        let ropes: Vec<RopeParams> = (0..ROPES).map(|_| rope(&mut random)).collect();
         let throws = (0..THROWS)
             .map(|_| throw(&mut random))
             .collect::<Result<_, _>>()?;
         let still = JointTrajectory::hold(JointVector(POSE), 1.0)?;
         Ok(Self {
+            real: ropes.iter().map(with_discrepancy).collect(),
             ropes,
             throws,
             wiggle: wiggle()?,
@@ -58,9 +61,18 @@ impl Workload {
 
     /// The first `count` throws, each with a rope of its own.
     pub fn throwing(&self, count: usize) -> Vec<Candidate<'_>> {
+        self.throwing_with(&self.ropes, count)
+    }
+
+    /// The same with some ropes, in turn.
+    pub fn throwing_with<'a>(
+        &'a self,
+        ropes: &'a [RopeParams],
+        count: usize,
+    ) -> Vec<Candidate<'a>> {
         self.throws
             .iter()
-            .zip(self.ropes.iter().cycle())
+            .zip(ropes.iter().cycle())
             .take(count)
             .map(|(motion, rope)| Candidate::new(rope, motion))
             .collect()
@@ -133,6 +145,19 @@ fn rope(random: &mut ChaCha8Rng) -> RopeParams {
         links: LINKS,
         ..RopeParams::from_array(numbers)
     }
+}
+
+/// As a fit beyond the nine parameters finds ropes.
+fn with_discrepancy(rope: &RopeParams) -> RopeParams {
+    rope.with_extras(RopeExtras {
+        rest_curvature_per_m: [0.3, -0.2, 0.0],
+        clamp_stiffness: 1.4,
+        friction: Some(BendingFriction {
+            moment_max_nm: 0.2 * rope.bending_stiffness_nm2(),
+            slip_curvature_per_m: 0.5,
+        }),
+        ..RopeExtras::NONE
+    })
 }
 
 fn throw(random: &mut ChaCha8Rng) -> Result<PlannedArm, TrajectoryError> {
