@@ -14,7 +14,6 @@ use super::out_of_distribution::out_of_distribution;
 use super::posterior::posterior;
 use super::refine::{Refined, refine};
 use super::reliance;
-use super::steps::are_too_long;
 use crate::observation::{Appearance, Observation, ObservedPoints};
 use crate::ropes::{random_rope, trial_rope};
 use crate::synthetic::{FilmNoise, FilmTiming, film, side_camera};
@@ -89,7 +88,6 @@ fn fitted_to(arm: &PlannedArm, timing: &FilmTiming, rope: &RopeParams) -> (Point
             },
         };
         let found = fit.refine(&coordinates, &truth, 0.1).unwrap();
-        assert!(!are_too_long(&found));
         (found.x - truth, fit.film.options.step_s)
     })
 }
