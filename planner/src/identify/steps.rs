@@ -27,7 +27,7 @@ pub(super) fn short_enough(
     let mut found = fit(film, None)?;
     for halvings in 0..=HALVINGS_MAX {
         found.moved_px = moved_px(film, &found.x)?;
-        if found.moved_px <= MOVED_MAX_PX || halvings == HALVINGS_MAX {
+        if !are_too_long(&found) || halvings == HALVINGS_MAX {
             break;
         }
         film.options.step_s /= 2.0;

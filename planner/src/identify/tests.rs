@@ -14,6 +14,7 @@ use super::out_of_distribution::out_of_distribution;
 use super::posterior::posterior;
 use super::refine::{Refined, refine};
 use super::reliance;
+use super::steps::short_enough;
 use crate::observation::{Appearance, Observation, ObservedPoints};
 use crate::ropes::{random_rope, trial_rope};
 use crate::synthetic::{FilmNoise, FilmTiming, film, side_camera};
@@ -65,15 +66,39 @@ fn refined(film: &Film<'_>, reach: Reach, start: &Point, budget: &mut Budget<'_>
     refine(film, &coordinates, start, 0.1, budget).unwrap()
 }
 
-/// A fit from the rope's own parameters on: how far it ends from them, and in which steps (s).
+/// A slack rope of 0.2 kg/m.
+fn slack_rope() -> RopeParams {
+    RopeParams {
+        joint_stiffness_nm_per_rad: 1e-3,
+        joint_damping_nms_per_rad: 4e-4,
+        mass_per_length_kg_per_m: 0.2,
+        lead_mass_kg: 0.02,
+        ..trial_rope(2, 8)
+    }
+}
+
+/// A plain fit from the rope's own parameters on: how far it ends from them, and in which steps (s).
 fn fitted(rope: &RopeParams) -> (Point, f64) {
     let arm = wiggling_arm(&WiggleConfig::default()).unwrap();
     fitted_to(&arm, &FilmTiming::default(), rope)
 }
 
+/// The same to a film of another motion.
 fn fitted_to(arm: &PlannedArm, timing: &FilmTiming, rope: &RopeParams) -> (Point, f64) {
     let truth = point_of(rope);
-    with_film_of(arm, timing, rope, |film, _| {
+    with_film_of(arm, timing, rope, |mut film, budget| {
+        let found = short_enough(&mut film, |film, from| {
+            let start = from.map_or(&truth, |from| &from.x);
+            Ok(refined(film, Reach::Wide, start, budget))
+        });
+        (found.unwrap().x - truth, film.options.step_s)
+    })
+}
+
+/// The check is part of every fit.
+#[test]
+fn a_fit_goes_on_in_shorter_steps_where_it_must() {
+    with_film(&slack_rope(), |film, _| {
         let clock = film.clock_window();
         let coordinates = film.coordinates(clock, Reach::Wide);
         let go_on = &mut |_| ControlFlow::Continue(());
@@ -87,23 +112,17 @@ fn fitted_to(arm: &PlannedArm, timing: &FilmTiming, rope: &RopeParams) -> (Point
                 progress: go_on,
             },
         };
-        let found = fit.refine(&coordinates, &truth, 0.1).unwrap();
-        (found.x - truth, fit.film.options.step_s)
-    })
+        let start = point_of(&slack_rope());
+        fit.refine(&coordinates, &start, 0.1).unwrap();
+        assert!(fit.film.options.step_s < IdentifyOptions::default().step_s);
+    });
 }
 
 #[test]
 fn a_slack_heavy_rope_is_fitted_in_shorter_steps_and_a_rope_of_the_ranges_is_not() {
     let (_, step_s) = fitted(&trial_rope(2, 9));
     assert_eq!(step_s, IdentifyOptions::default().step_s);
-    let slack = RopeParams {
-        joint_stiffness_nm_per_rad: 1e-3,
-        joint_damping_nms_per_rad: 4e-4,
-        mass_per_length_kg_per_m: 0.2,
-        lead_mass_kg: 0.02,
-        ..trial_rope(2, 8)
-    };
-    let (off, step_s) = fitted(&slack);
+    let (off, step_s) = fitted(&slack_rope());
     assert!(step_s < IdentifyOptions::default().step_s);
     // In the usual steps 3 % of stiffness and damping.
     assert!(off[LENGTH].abs() < 1e-3, "{off}");
@@ -113,9 +132,10 @@ fn a_slack_heavy_rope_is_fitted_in_shorter_steps_and_a_rope_of_the_ranges_is_not
     );
 }
 
-/// The steps of a wiggle do for a throw of a rope of the ranges, whose short film tells it less well.
+/// The steps are chosen for the motion that was filmed, whichever it is. So short a film tells the
+/// parameters less well.
 #[test]
-fn a_rope_of_the_ranges_is_fitted_to_a_throw_in_the_usual_steps() {
+fn a_throw_is_fitted_in_the_steps_that_it_needs() {
     let start = wiggling_arm(&WiggleConfig::default())
         .unwrap()
         .trajectory()
@@ -134,9 +154,10 @@ fn a_rope_of_the_ranges_is_fitted_to_a_throw_in_the_usual_steps() {
     };
     let usual_s = IdentifyOptions::default().step_s;
     let rope = trial_rope(2, 9);
-    let (off, step_s) = fitted_to(&arm, &timing, &rope);
+    let (_, step_s) = fitted_to(&arm, &timing, &rope);
     assert_eq!(step_s, usual_s);
-    assert!(off[LENGTH].abs() < 3e-3, "{off}");
+    let (_, thrown_s) = fitted_to(&arm, &timing, &slack_rope());
+    assert!(thrown_s < usual_s, "{thrown_s}");
 }
 
 /// What went into other numbers than the residual is said, and counts as unexplained.
