@@ -17,7 +17,6 @@ mod command;
 mod config;
 mod doctor;
 mod pipeline;
-mod session;
 
 use clap::Parser;
 use std::process::ExitCode;

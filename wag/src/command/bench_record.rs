@@ -7,7 +7,6 @@
 use crate::cli::BenchArgs;
 use crate::config;
 use crate::pipeline::{self, BringUp, RunFolder};
-use crate::session::Session;
 use anyhow::{Context, ensure};
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{Machine, OrInput, Outcome, Stage, table, watch_interrupts};
@@ -16,6 +15,7 @@ use planner::wiggle::wiggle;
 use rig_sim::RigConfig;
 use run_log::files;
 use serde_json::{Value, json};
+use session::Session;
 use shared_types::OperatingMode;
 use shared_types::ipc::message::Percentiles;
 use shared_types::ipc::{ControllerMode, CycleRecord};

@@ -3,13 +3,13 @@
 use crate::cli::{RecordArgs, RecordCommand};
 use crate::config;
 use crate::pipeline::RunFolder;
-use crate::session::remedy;
 use anyhow::Context;
 use arm_model::Limits;
 use cli_output::{OrInput, Outcome, is_interrupted, watch_interrupts};
 use run_log::files;
 use run_log::{Recorded, RecorderConfig, Run, RunFileThread};
 use serde_json::{Value, json};
+use session::remedy;
 use shared_types::ipc::{Bus, DomainSweep, running_controllers};
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -9,7 +9,6 @@ use super::unconfirmed::confirm;
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
 use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
-use crate::session::Session;
 use arm_model::{ArmResponse, JOINTS, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
 use planner::plan::warnings;
@@ -18,6 +17,7 @@ use rt_controller::control::{Motion, OperatingModeSpeeds};
 use rt_controller::os::now_ns;
 use run_log::files::{self, read_plan};
 use serde_json::{Value, json};
+use session::Session;
 use shared_types::{OperatingMode, Plan};
 use std::path::Path;
 

@@ -2,13 +2,13 @@
 
 use crate::cli::WatchArgs;
 use crate::config;
-use crate::session::{ProcessSpec, Supervisor};
 use anyhow::Context;
 use camera_ingest::load_camera;
 use camera_ingest::preview::PreviewConfig;
 use cli_output::{Failure, OrInput, Outcome, is_interrupted, output, watch_interrupts};
 use run_log::files;
 use serde_json::{Value, json};
+use session::{ProcessSpec, Supervisor};
 use shared_types::ipc::IpcError;
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -1,10 +1,10 @@
 //! Asking the controller: bring-up, moves, trajectories, latencies.
 
-use crate::session::Session;
 use anyhow::{anyhow, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use rt_controller::os::now_ns;
 use run_log::MotionSpan;
+use session::Session;
 use shared_types::OperatingMode;
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{

@@ -2,7 +2,6 @@
 
 use super::{ArmLink, RunFolder, Service};
 use crate::config;
-use crate::session::{ProcessSpec, Session};
 use anyhow::bail;
 use arm_model::{ArmResponse, Limits};
 use rig_sim::RigConfig;
@@ -10,6 +9,7 @@ use rt_controller::ControllerConfig;
 use rt_controller::arm_settings::ArmSettings;
 use rt_controller::config::OnDifference;
 use run_log::RecorderConfig;
+use session::{ProcessSpec, Session};
 use shared_types::ipc::message::{ControllerRequest, RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::{Rpc, RpcClient};
 use shared_types::{CommandInterface, StereoCamera};

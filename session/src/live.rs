@@ -13,9 +13,11 @@ use std::time::{Duration, Instant, SystemTime};
 /// What the operator confirmed by a word, and when.
 #[derive(Debug, Clone, Copy)]
 pub struct Confirmation {
+    /// What was typed.
     pub word: &'static str,
     /// CLOCK_MONOTONIC (ns).
     pub at_ns: u64,
+    /// The same by the wall clock.
     pub at: SystemTime,
 }
 
@@ -32,6 +34,7 @@ pub struct Session {
     supervisor: Supervisor,
     /// What stages work with.
     pub received: Received,
+    /// Every word by which the operator confirmed a motion, in order.
     pub confirmed: Vec<Confirmation>,
     run_file: Option<RunFile>,
     bus: Bus,
@@ -174,6 +177,10 @@ impl Session {
         }
     }
 
+    /// Starts a process, which is watched from now on.
+    ///
+    /// # Errors
+    /// It cannot be started.
     pub fn start(&mut self, spec: &ProcessSpec) -> anyhow::Result<()> {
         self.supervisor.start(spec, &self.log_folder)
     }

@@ -19,6 +19,10 @@ pub struct Received {
 }
 
 impl Received {
+    /// Subscribes to everything.
+    ///
+    /// # Errors
+    /// Shared memory cannot be used.
     pub fn open(bus: &Bus) -> Result<Self, IpcError> {
         Ok(Self {
             joint_subscriber: bus.joint_subscriber()?,
@@ -29,6 +33,10 @@ impl Received {
         })
     }
 
+    /// Takes what has come.
+    ///
+    /// # Errors
+    /// Shared memory cannot be used.
     pub fn drain(&mut self) -> anyhow::Result<()> {
         let lost = "cannot receive records from shared memory";
         while let Some(sample) = self.joint_subscriber.receive().context(lost)? {

@@ -20,7 +20,7 @@ pub fn remedy(file: &Path) -> String {
 }
 
 #[derive(Debug)]
-pub struct RunFile {
+pub(crate) struct RunFile {
     process: Supervisor,
     path: PathBuf,
     lost: Option<anyhow::Error>,
@@ -29,7 +29,7 @@ pub struct RunFile {
 impl RunFile {
     /// Starts the process and waits until nothing can be missed any more. When it
     /// cannot be had, that is known at once and reported at the end.
-    pub fn start(spec: &ProcessSpec, path: &Path, log_folder: &Path) -> Self {
+    pub(crate) fn start(spec: &ProcessSpec, path: &Path, log_folder: &Path) -> Self {
         let mut file = Self {
             process: Supervisor::default(),
             path: path.to_owned(),
@@ -67,7 +67,7 @@ impl RunFile {
     }
 
     /// Looks whether the process still lives.
-    pub fn watch(&mut self) {
+    pub(crate) fn watch(&mut self) {
         if self.lost.is_none()
             && let Err(reason) = self.process.check()
         {
@@ -76,7 +76,7 @@ impl RunFile {
     }
 
     /// Lets the process finish the file, once all results lie in the run folder.
-    pub fn finish(mut self) -> anyhow::Result<()> {
+    pub(crate) fn finish(mut self) -> anyhow::Result<()> {
         let ended = self.process.finish(FINISH);
         let ended = self.lost.take().map_or(ended, Err);
         ended.with_context(|| remedy(&self.path))

@@ -3,7 +3,7 @@
 //!
 //! Each child runs in a process group of its own, so that Ctrl-C reaches only
 //! the supervisor, which then ends the children in order. A child whose parent
-//! is gone ends itself (see `command::process`).
+//! is gone ends itself.
 
 use anyhow::{Context, anyhow};
 use rustix::process::{Pid, Signal, kill_process};
@@ -18,10 +18,12 @@ const GRACE: Duration = Duration::from_millis(1500);
 /// The same for a child that may have to brake an arm first, and to confirm its stop.
 const BRAKE_GRACE: Duration = Duration::from_millis(8000);
 
+/// A process of this very program.
 #[derive(Debug)]
 pub struct ProcessSpec {
     /// Name, as `wag process NAME` knows it.
     pub name: &'static str,
+    /// Its configuration file.
     pub config: PathBuf,
     /// Whether it holds an arm: it ends before everything the arm may need.
     pub holds_arm: bool,

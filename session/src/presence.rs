@@ -99,7 +99,7 @@ impl Typed {
 }
 
 #[derive(Debug)]
-pub struct Presence {
+pub(crate) struct Presence {
     lines: Receiver<Line>,
     typed: Typed,
 }
@@ -107,7 +107,7 @@ pub struct Presence {
 impl Presence {
     /// At standard input, from now on. The thread that reads it may outlive this: nothing can
     /// wake a read of standard input.
-    pub fn at_standard_input(switch: Switch) -> anyhow::Result<Self> {
+    pub(crate) fn at_standard_input(switch: Switch) -> anyhow::Result<Self> {
         Self::reading(switch, |line| io::stdin().read_line(line))
     }
 
@@ -149,36 +149,36 @@ impl Presence {
         MonotonicNs(now_ns())
     }
 
-    pub const fn switch(&self) -> Switch {
+    pub(crate) const fn switch(&self) -> Switch {
         self.typed.switch
     }
 
-    pub fn is_let_go(&mut self) -> bool {
+    pub(crate) fn is_let_go(&mut self) -> bool {
         let now = self.look();
         self.typed.is_let_go(now)
     }
 
     /// From now on `word` confirms. What was typed before does not: it lets go.
-    pub fn request(&mut self, word: &'static str) {
+    pub(crate) fn request(&mut self, word: &'static str) {
         let since = self.look();
         self.typed.question = Some(Question { word, since });
         self.typed.confirmed = None;
     }
 
     /// When the requested word was typed (CLOCK_MONOTONIC).
-    pub const fn confirmed(&self) -> Option<MonotonicNs> {
+    pub(crate) const fn confirmed(&self) -> Option<MonotonicNs> {
         self.typed.confirmed
     }
 
     /// Whether a motion may begin; from then on the switch must be held until
     /// [`rests`](Self::rests).
-    pub fn lets_move(&mut self) -> bool {
+    pub(crate) fn lets_move(&mut self) -> bool {
         let now = self.look();
         self.typed.lets_move(now)
     }
 
     /// The motion is over: a key may be released.
-    pub const fn rests(&mut self) {
+    pub(crate) const fn rests(&mut self) {
         self.typed.moving = false;
     }
 }
