@@ -1,4 +1,4 @@
-//! Answers about the rig: ports, target, truth.
+//! Answers about the rig: ports, camera and colours, target, truth.
 
 use super::config::RigConfig;
 use super::error::RigError;
@@ -83,6 +83,14 @@ fn answer(request: &RigRequest, config: &RigConfig, ports: ArmPorts, record: &Re
             }
             record.place_target(Some(Vector3::from(target_m)));
             RigEvent::Done
+        }
+        RigRequest::Scene => {
+            let colours = config.appearance();
+            RigEvent::Scene {
+                camera: Box::new(config.camera.stereo_camera()),
+                tip_rgb: colours.lead_rgb,
+                target_rgb: colours.target_rgb,
+            }
         }
         RigRequest::Truth { from_ns, to_ns } => {
             record.wait_for(MonotonicNs(to_ns), PATIENCE);

@@ -28,7 +28,6 @@ mod clamp_motion;
 mod command_line;
 mod cycle_sample;
 mod cycles;
-mod demo_record;
 mod explanation;
 pub mod files;
 pub mod ledger;
@@ -36,12 +35,13 @@ mod margins;
 mod mcap_file;
 mod page;
 mod run;
+mod run_record;
+mod tracked_film;
 
 pub use clamp_motion::ClampMotion;
 pub use command_line::{CommandLine, quoted};
 pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 pub use cycles::{CYCLES_TABLE, Cycles};
-pub use demo_record::{DemoRecord, Film, MotionSpan, Settled, StageTimes, Tracked};
 pub use explanation::{Explanation, Late, LimitExceeded, Row, Stop, explain};
 pub use margins::Margin;
 pub use mcap_file::{
@@ -50,3 +50,5 @@ pub use mcap_file::{
 };
 pub use page::show;
 pub use run::{CellHere, NoRecording, Recording, Run};
+pub use run_record::{Film, MotionSpan, RunRecord, Settled, StageTimes, Tracked};
+pub use tracked_film::TrackedFilm;

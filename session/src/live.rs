@@ -244,6 +244,22 @@ impl Session {
         }
     }
 
+    /// Connects to a service that serves already; `None` where nobody does.
+    ///
+    /// # Errors
+    /// Its process does not answer `ping`.
+    pub fn find<R: Rpc>(&mut self, ping: &R::Request) -> anyhow::Result<Option<RpcClient<R>>> {
+        let client = RpcClient::<R>::open(&self.bus)?;
+        match client.call(ping) {
+            Ok(pending) => {
+                self.finish(&pending, STARTUP_S, |_| ())?;
+                Ok(Some(client))
+            }
+            Err(IpcError::Gone { .. }) => Ok(None),
+            Err(e) => Err(e.into()),
+        }
+    }
+
     /// Takes the operator's place at a running controller.
     pub fn take_operator(&mut self) -> anyhow::Result<()> {
         let taken = "the operator's place at the controller cannot be had: end the other command that uses it, then run this one again";

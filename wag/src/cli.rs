@@ -5,6 +5,7 @@ mod config;
 mod images;
 mod ledger;
 mod plans;
+mod run;
 mod runs;
 mod values;
 
@@ -13,6 +14,7 @@ pub use config::*;
 pub use images::*;
 pub use ledger::*;
 pub use plans::*;
+pub use run::*;
 pub use runs::*;
 pub use values::Point;
 
@@ -22,7 +24,6 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_output::seed;
 use planner::identify::Method;
 use rope_sim::Precision;
-use shared_types::Task;
 use std::net::IpAddr;
 use std::path::PathBuf;
 
@@ -37,6 +38,7 @@ const GLOBAL: &str = "Global options";
     about = "Wiggle and Go: identify a rope from one wiggle, plan a throw, execute it",
     after_help = "EXAMPLES:\n  \
         wag demo                                   everything, on a simulated robot\n  \
+        wag run strike --arm ADDR --camera /dev/video0 --target 0.9,0,0.3\n  \
         wag rig --command-port 5502                a simulated xArm 7 for your own client\n  \
         wag plan strike --rope rope.toml --target 1.0,0,0.4 --out plan.json\n  \
         wag check plan.json\n\n\
@@ -66,6 +68,8 @@ pub struct Cli {
 pub enum Command {
     /// The whole pipeline on a simulated rig with a hidden random rope.
     Demo(DemoArgs),
+    /// From wiggle to throw with an arm and a camera: film, identify, plan, throw, score.
+    Run(RunArgs),
     /// Run the simulated xArm 7 as a server, with a rope and a camera if asked.
     Rig(RigArgs),
     /// Simulate a rope.
@@ -151,39 +155,6 @@ pub enum Command {
     /// Run one of the processes in the foreground (what `wag` itself starts).
     #[command(hide = true)]
     Process(ProcessArgs),
-}
-
-#[derive(Debug, Args)]
-pub struct DemoArgs {
-    /// What the throw is for; the rig has a scene for strikes only so far.
-    #[arg(long, default_value = "strike", value_parser = one_of([
-        ("strike", "The tip passes through the target", Task::Strike),
-        ("lob", "", Task::Lob),
-        ("drape", "", Task::Drape),
-    ]))]
-    pub task: Task,
-    /// Seed of the hidden rope, the target, the noise and every search.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
-    pub seed: u64,
-    /// Folder for the run; it must not exist. Default: runs/TIME-demo-SEED.
-    #[arg(long)]
-    pub out: Option<PathBuf>,
-    /// Target x,y,z in the arm's base frame (m); default: random from the seed.
-    #[arg(long, allow_hyphen_values = true)]
-    pub target: Option<Point>,
-    /// Set-up of the simulated rig (TOML), as configs/rig/demo.toml; default: that
-    /// file. Domain, seed, ports and target are the demo's own.
-    #[arg(long, value_name = "FILE")]
-    pub rig_config: Option<PathBuf>,
-    /// Go on although the track of the rope is unconfirmed.
-    #[arg(long)]
-    pub accept_unconfirmed: bool,
-    /// Throw at the target of this demo again, with its rope, corrected by the miss that its
-    /// camera measured; again for a third throw, with the run of the second.
-    #[arg(long, value_name = "RUN", conflicts_with_all = [
-        "task", "seed", "target", "rig_config", "accept_unconfirmed",
-    ])]
-    pub again: Option<PathBuf>,
 }
 
 #[derive(Debug, Subcommand)]

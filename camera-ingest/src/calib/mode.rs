@@ -33,6 +33,13 @@ impl VideoMode {
         }
     }
 
+    /// The mode whose images have this width and height (px).
+    #[must_use]
+    pub fn of_size_px(size_px: (u32, u32)) -> Option<Self> {
+        let all = [Self::TwoK, Self::FullHd, Self::Hd, Self::Vga];
+        all.into_iter().find(|mode| mode.size_px() == size_px)
+    }
+
     /// Width and height of one image (px).
     #[must_use]
     pub fn size_px(self) -> (u32, u32) {

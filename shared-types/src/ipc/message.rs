@@ -356,7 +356,7 @@ impl Rpc for ControllerRpc {
     }
 }
 
-/// Asks of the simulated rig. Only the summary at the end of a demo asks for
+/// Asks of the simulated rig. Only the summary at the end of a run asks for
 /// the truth; nothing that identifies or plans does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum RigRequest {
@@ -374,6 +374,8 @@ pub enum RigRequest {
         /// To (CLOCK_MONOTONIC, ns).
         to_ns: u64,
     },
+    /// What a laboratory would know: where the camera stands, and which colours to look for.
+    Scene,
 }
 
 /// Answers of the simulated rig.
@@ -401,6 +403,15 @@ pub enum RigEvent {
         /// Whether the rope touched arm or column in that time.
         touched: bool,
     },
+    /// What there is to see.
+    Scene {
+        /// The calibrated camera.
+        camera: Box<StereoCamera>,
+        /// Colour of the rope's tip.
+        tip_rgb: [u8; 3],
+        /// Colour of the target.
+        target_rgb: [u8; 3],
+    },
     /// It did not work.
     Failed {
         /// One sentence: what happened and what to do.
@@ -413,7 +424,7 @@ pub enum RigEvent {
 pub struct RigRpc;
 
 impl Rpc for RigRpc {
-    const NAME: &'static str = "wag/v2/rig/control";
+    const NAME: &'static str = "wag/v3/rig/control";
     type Request = RigRequest;
     type Event = RigEvent;
     fn is_last(_event: &RigEvent) -> bool {

@@ -1,8 +1,8 @@
 //! The commands that move an arm, the one that simulates it, and those that measure its
 //! control loop.
 
-use super::Point;
 use super::values::host;
+use super::{CameraArgs, Point};
 use clap::{ArgGroup, Args, ValueEnum};
 use cli_output::seed;
 use std::net::IpAddr;
@@ -95,6 +95,11 @@ pub struct WiggleArgs {
     /// Write the wiggle as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
     #[arg(long)]
     pub csv: Option<PathBuf>,
+    #[command(flatten)]
+    pub camera: CameraArgs,
+    /// Keep the film although the track of the rope is unconfirmed.
+    #[arg(long, requires = "camera")]
+    pub accept_unconfirmed: bool,
     #[command(flatten)]
     pub arm: ArmArgs,
     /// Folder for the run; it must not exist. Default: runs/TIME-wiggle.

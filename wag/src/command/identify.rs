@@ -9,13 +9,15 @@ use super::unconfirmed::confirm;
 use crate::cli::IdentifyArgs;
 use crate::config;
 use anyhow::Context;
+use camera_ingest::load_camera;
 use cli_output::{Failure, OrInput, Outcome, Stage, table};
 use comfy_table::Table;
 use planner::PlannerConfig;
 use planner::identify::{IdentifyOptions, Method};
 use planner::observation::{Appearance, Observation, ObservedPoints};
+use planner::phi::PhiNet;
 use rope_sim::AttachMotion;
-use run_log::{ClampMotion, files};
+use run_log::{ClampMotion, Run, files};
 use serde_json::{Value, json};
 use shared_types::rope::{Ambiguity, RANGES};
 use shared_types::{KeypointTrack, RopeEstimate, RopeParams, StereoCamera};
@@ -33,6 +35,58 @@ struct Observed {
     warnings: Vec<String>,
 }
 
+impl Observed {
+    /// What a run keeps of its tracked wiggle.
+    fn of_run(folder: &Path, method: Method, accepted: bool) -> Outcome<Self> {
+        let run = Run::open(folder).or_input()?;
+        let camera = load_camera(&folder.join(files::CAMERA)).or_input()?;
+        let film = run.tracked_film().or_input()?;
+        let pole = config::cell_of(&run).or_input()?.pole;
+        let clamp = ClampMotion::new(folder, Some(film.joints), pole, 0.0);
+        let look = format!("look at `{}`", folder.join("wiggle.png").display());
+        let mut unconfirmed = film.track.unconfirmed.clone();
+        let summary = run.summary().or_input()?.unwrap_or_default();
+        let kept = summary["track"]["unconfirmed"]
+            .as_array()
+            .into_iter()
+            .flatten();
+        unconfirmed.extend(kept.filter_map(|why| why.as_str().map(str::to_owned)));
+        confirm(&unconfirmed, accepted, &look).or_failed()?;
+        let [rope_radius_m, lead_radius_m] = film.radii_m;
+        Ok(Self {
+            appearance: Appearance {
+                rope_radius_m,
+                lead_radius_m,
+            },
+            track: KeypointTrack {
+                unconfirmed,
+                ..film.track
+            },
+            camera,
+            motion: clamp.attach().or_input()?,
+            warnings: other_pole(&clamp, method).into_iter().collect(),
+        })
+    }
+
+    /// The rope behind it.
+    fn estimate(
+        &self,
+        options: &IdentifyOptions,
+        net: Option<&PhiNet>,
+        stage: &Stage,
+    ) -> Outcome<RopeEstimate> {
+        let observation = Observation {
+            track: &self.track,
+            points: ObservedPoints::ArcLength,
+            camera: &self.camera,
+            motion: self.motion.as_ref(),
+            appearance: self.appearance,
+        };
+        planner::identify(&observation, options, net, &mut |p| stage.go_on(&p))
+            .map_err(|error| Failure::of(error.is_input(), error))
+    }
+}
+
 /// What to know about the pole, where a network is asked.
 fn other_pole(motion: &ClampMotion, method: Method) -> Option<String> {
     warning_of_pole(method, motion.pole()?).map(str::to_owned)
@@ -47,6 +101,9 @@ fn read_keypoints(path: &Path) -> anyhow::Result<KeypointTrack> {
 
 fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     if let Some(path) = &args.observation.keypoints {
+        if path.is_dir() {
+            return Observed::of_run(path, method, args.accept_unconfirmed);
+        }
         let camera = args.scene.camera().or_input()?;
         let clamp = named_motion(&args.scene).or_input()?;
         let motion = clamp.attach().or_input()?;
@@ -173,6 +230,23 @@ fn print_remarks(estimate: &RopeEstimate) {
     }
 }
 
+/// The rope of a run whose wiggle was tracked, identified again, and why its track should not be
+/// relied on.
+pub fn again(
+    run: &Path,
+    options: &IdentifyOptions,
+    accept_unconfirmed: bool,
+) -> Outcome<(RopeEstimate, Vec<String>)> {
+    let method = options.method;
+    let net = method.asks_network().then(|| network(None)).transpose()?;
+    let observed = Observed::of_run(run, method, accept_unconfirmed)?;
+    let stage = Stage::begin("identify");
+    let estimate = observed.estimate(options, net.as_ref(), &stage)?;
+    stage.done(&format!("residual {:.2} px", estimate.residual_px));
+    print_remarks(&estimate);
+    Ok((estimate, observed.track.unconfirmed))
+}
+
 pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
     let (method, model) = (args.method, args.model.as_deref());
     no_model_without_network(method, model)?;
@@ -181,13 +255,6 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
     cli_output::watch_interrupts().or_failed()?;
     let observed = observe(args, method)?;
     let stage = Stage::begin("identify");
-    let observation = Observation {
-        track: &observed.track,
-        points: ObservedPoints::ArcLength,
-        camera: &observed.camera,
-        motion: observed.motion.as_ref(),
-        appearance: observed.appearance,
-    };
     let options = IdentifyOptions {
         method,
         seed: args.seed,
@@ -195,10 +262,7 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
         length_m: args.length,
         ..config.identify
     };
-    let estimate = planner::identify(&observation, &options, net.as_ref(), &mut |p| {
-        stage.go_on(&p)
-    })
-    .map_err(|error| Failure::of(error.is_input(), error))?;
+    let estimate = observed.estimate(&options, net.as_ref(), &stage)?;
     let seconds = stage.done(&format!(
         "residual {:.2} px, {} simulations",
         estimate.residual_px, estimate.simulations

@@ -12,10 +12,12 @@ mod dry_run;
 mod film;
 mod film_input;
 mod identify;
+mod known_rope;
 mod latency;
 mod learned;
 mod ledger;
 mod manual;
+mod motion;
 mod network;
 mod on_arm;
 mod plan;
@@ -23,6 +25,7 @@ mod plan_again;
 mod process;
 mod record;
 mod rig;
+mod run;
 mod runs;
 mod score;
 mod sim;
@@ -69,6 +72,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
     }
     match &cli.command {
         Command::Demo(args) => demo::run(args),
+        Command::Run(args) => run::run(args),
         Command::Rig(args) => rig::run(args),
         Command::Sim(SimCommand::Rope(args)) => sim::rope(args),
         Command::Sim(SimCommand::Throw(args)) => sim::throw(args),

@@ -11,7 +11,6 @@ use run_log::{Cycles, files};
 use serde_json::{Value, json};
 use session::{Confirmation, Session, Switch};
 use shared_types::ipc::IpcError;
-use shared_types::ipc::message::ControllerRequest;
 use shared_types::{OperatingMode, Plan};
 use std::path::{Path, PathBuf};
 
@@ -44,16 +43,7 @@ pub fn on_arm(
         folder.domain.clone_from(&service.config.domain);
     }
     let mut session = Session::new(&folder.domain, &folder.log()).or_failed()?;
-    if arm.hold_to_run {
-        session.watch_operator(Switch::HoldToRun).or_failed()?;
-    } else if arm.dead_man || asks(arm, &address) {
-        session.watch_operator(Switch::DeadMan).or_failed()?;
-    }
-    if arm.ask && address.simulated {
-        eprintln!(
-            "A rehearsal: the simulated arm has no enabling switch, takes the settings that it is given, and is compared with a measured response only if --arm-response names one"
-        );
-    }
+    watch_operator(&mut session, arm, &address).or_failed()?;
     let mut found = BringUp::default();
     let worked = |session: &mut Session| -> anyhow::Result<Value> {
         let link = bring_up(
@@ -75,12 +65,7 @@ pub fn on_arm(
     let cycles = std::mem::take(&mut session.received.cycles);
     let epoch_ns = cycles.cycles.first().map_or(0, |c| c.deadline_ns);
     let by_service = address.service.is_some();
-    let result = result.map_err(|error| match error.downcast_ref() {
-        Some(IpcError::Gone { .. }) if by_service => error.context(
-            "the controller that runs as a service ended; an arm that moved is stopped by its guardian, whose log says so: look at the arm, and start both again",
-        ),
-        _ => error,
-    });
+    let result = result.map_err(|error| of_service(by_service, error));
     let result = result.and_then(|value| conclude(folder.path.as_path(), cycles, value));
     let mut summary = match &result {
         Ok(value) => value.clone(),
@@ -88,13 +73,8 @@ pub fn on_arm(
     };
     summary["epoch_ns"] = epoch_ns.into();
     summary["operator"] = json!(operator);
-    let confirmed = |c: &Confirmation| {
-        let at = humantime::format_rfc3339_millis(c.at).to_string();
-        json!({ "word": c.word, "at_ns": c.at_ns, "at": at })
-    };
-    summary["confirmed"] = session.confirmed.iter().map(confirmed).collect();
-    let step = |(step, result): &(String, String)| json!({ "step": step, "result": result });
-    summary["bring_up"] = found.steps.iter().map(step).collect();
+    summary["confirmed"] = confirmations(&session).into();
+    summary["bring_up"] = found.steps_json().into();
     let kept = files::write_json(&folder.file(files::SUMMARY), &summary);
     let recorded = session.finish_run_file();
     // A stop that was measured needs no explanation.
@@ -105,6 +85,44 @@ pub fn on_arm(
     recorded.or_failed()?;
     kept.or_failed()?;
     Ok((folder.path.clone(), value))
+}
+
+/// Watches the operator at standard input, as the arm and the command line want it.
+pub fn watch_operator(
+    session: &mut Session,
+    arm: &ArmArgs,
+    address: &ArmAddress,
+) -> anyhow::Result<()> {
+    if arm.hold_to_run {
+        session.watch_operator(Switch::HoldToRun)?;
+    } else if arm.dead_man || asks(arm, address) {
+        session.watch_operator(Switch::DeadMan)?;
+    }
+    if arm.ask && address.simulated {
+        eprintln!(
+            "A rehearsal: the simulated arm has no enabling switch, takes the settings that it is given, and is compared with a measured response only if --arm-response names one"
+        );
+    }
+    Ok(())
+}
+
+/// What the operator confirmed, as a summary contains it.
+pub fn confirmations(session: &Session) -> Vec<Value> {
+    let confirmed = |c: &Confirmation| {
+        let at = humantime::format_rfc3339_millis(c.at).to_string();
+        json!({ "word": c.word, "at_ns": c.at_ns, "at": at })
+    };
+    session.confirmed.iter().map(confirmed).collect()
+}
+
+/// What to do when the controller that ended was not this command's own.
+pub fn of_service(by_service: bool, error: anyhow::Error) -> anyhow::Error {
+    match error.downcast_ref() {
+        Some(IpcError::Gone { .. }) if by_service => error.context(
+            "the controller that runs as a service ended; an arm that moved is stopped by its guardian, whose log says so: look at the arm, and start both again",
+        ),
+        _ => error,
+    }
 }
 
 /// Starts everything and moves to the start pose; what was `found` on the way.
@@ -122,8 +140,7 @@ fn bring_up(
     session.take_operator()?;
     if let Some(service) = &address.service {
         // What was asked, checked and confirmed was so for that configuration.
-        let now = session.ask(&link, &ControllerRequest::Configuration, 5.0, |_| ())?;
-        service.require_unchanged(&now)?;
+        service.require_unchanged(session, &link)?;
     }
     pipeline::enable(session, &link, acknowledges, found)?;
     for warning in &found.warnings {

@@ -1,20 +1,20 @@
 //! `wag plan`: from a rope and a target to a checked plan.
 
+use super::known_rope::KnownRope;
 use super::unconfirmed::confirm;
 use crate::cli::{PlanArgs, PlannerArgs};
 use crate::config;
-use anyhow::{bail, ensure};
+use anyhow::bail;
 use arm_model::Limits;
 use cli_output::{Failure, OrInput, Outcome, Stage, output};
 use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::plan::{
-    PlanError, PlanOptions, PlanRequest, PosteriorEnsemble, ReachMap, Shortcoming, clear_of_arm,
-    shortcoming, warnings,
+    PlanError, PlanOptions, PlanRequest, ReachMap, Shortcoming, clear_of_arm, shortcoming, warnings,
 };
 use run_log::files;
 use serde_json::{Value, json};
-use shared_types::{Plan, Task};
+use shared_types::{Plan, RopeParams, Task};
 use std::path::Path;
 
 /// Bad requests are the caller's; everything else is a failure of the work.
@@ -46,42 +46,18 @@ pub fn read(args: &PlannerArgs) -> anyhow::Result<(Limits, PlannerConfig, Option
     Ok((limits, config, following))
 }
 
-/// What is known about the rope beyond its parameters, for forecast and `--robust`.
-fn ensemble(args: &PlanArgs) -> anyhow::Result<PosteriorEnsemble> {
-    let rope = files::read_rope(&args.rope)?;
-    let Some(posterior) = files::read_posterior(&args.rope)? else {
-        ensure!(
-            args.robust == 0,
-            "rope file `{}` has no table `posterior`: --robust needs a rope identified by this version",
-            args.rope.display()
-        );
-        return Ok(PosteriorEnsemble::default());
-    };
-    // A file of before does not say how well the model explains the film.
-    let forecast = if posterior.residual_m > 0.0 {
-        PosteriorEnsemble::FORECAST
-    } else {
-        0
-    };
-    let drawn = PosteriorEnsemble::drawn(&rope, &posterior, args.robust, forecast, args.seed);
-    let count = drawn.optimised.len();
-    ensure!(
-        count == args.robust,
-        "what rope file `{}` leaves open is hardly ever a rope: {count} of {} could be drawn; film and identify it again",
-        args.rope.display(),
-        args.robust
-    );
-    Ok(drawn)
-}
-
 /// Draws which targets the rope reaches; refuses one that it does not.
-fn reach(path: &Path, args: &PlanArgs, limits: &Limits, config: &PlannerConfig) -> Outcome<()> {
+fn reach(
+    path: &Path,
+    args: &PlanArgs,
+    rope: &RopeParams,
+    (limits, config): (&Limits, &PlannerConfig),
+) -> Outcome<()> {
     /// The reach is explored before anything else is done.
     const THREADS: usize = 2;
-    let rope = files::read_rope(&args.rope).or_input()?;
     let stage = Stage::begin("reach");
     let map = ReachMap::explore(
-        &rope,
+        rope,
         limits,
         &config.cell,
         &config.strike,
@@ -89,7 +65,7 @@ fn reach(path: &Path, args: &PlanArgs, limits: &Limits, config: &PlannerConfig) 
         THREADS,
     )
     .map_err(classify)?;
-    let picture = planner::plan::reach_svg(&map, &rope, args.target.0, args.seed);
+    let picture = planner::plan::reach_svg(&map, rope, args.target.0, args.seed);
     files::write_atomic(path, picture.as_bytes()).or_failed()?;
     stage.done(&format!(
         "{} throws, drawn in `{}`",
@@ -124,20 +100,19 @@ pub fn tell(plan: &Plan) {
 }
 
 pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
-    let rope = files::read_rope(&args.rope).or_input()?;
-    let unconfirmed = files::read_unconfirmed(&args.rope).or_input()?;
-    confirm(&unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
+    let known = KnownRope::read(&args.rope).or_input()?;
+    confirm(&known.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
     let (limits, config, following) = read(&args.planner).or_input()?;
-    let ensemble = ensemble(args).or_input()?;
+    let ensemble = known.ensemble(args.robust, args.seed).or_input()?;
     if let Some(path) = &args.reach {
         clear_of_arm(args.target.0, &config.cell).map_err(classify)?;
-        reach(path, args, &limits, &config)?;
+        reach(path, args, &known.params, (&limits, &config))?;
     }
     cli_output::watch_interrupts().or_failed()?;
     let stage = Stage::begin("plan");
     let request = PlanRequest {
         goal: config.goal(kind, args.target.0),
-        rope,
+        rope: known.params,
         limits: limits.clone(),
         cell: config.cell,
         options: PlanOptions {
@@ -151,7 +126,7 @@ pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
         following,
     };
     let mut plan = planner::plan(&request, &mut |p| stage.go_on(&p)).map_err(classify)?;
-    plan.unconfirmed = unconfirmed;
+    plan.unconfirmed = known.unconfirmed;
     let warnings = warnings(&plan);
     check_fault(&plan, args.allow_miss, &args.out).or_failed()?;
     stage.done(&describe(&plan));

@@ -2,6 +2,7 @@
 
 use super::area::{asks, limits, reach_measured, require_clear_area};
 use super::dry_run;
+use super::motion;
 use super::on_arm::{AT_START, on_arm};
 use super::plan::LOOK;
 use super::plan_again::LastThrow;
@@ -9,49 +10,15 @@ use super::unconfirmed::confirm;
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
 use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
-use arm_model::{ArmResponse, JOINTS, JointTrajectory, Limits};
+use arm_model::{ArmResponse, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
 use planner::plan::warnings;
-use rt_controller::armed_speed::ArmedSpeed;
-use rt_controller::control::{Motion, OperatingModeSpeeds};
 use rt_controller::os::now_ns;
 use run_log::files::{self, read_plan};
 use serde_json::{Value, json};
 use session::Session;
 use shared_types::{OperatingMode, Plan};
 use std::path::Path;
-
-/// Refuses a motion of a real arm in joints of which nobody knows how they follow.
-fn require_measured_joints(
-    address: &ArmAddress,
-    trajectory: &JointTrajectory,
-    name: &str,
-) -> Outcome {
-    let Some((path, response)) = address.arm_response.as_ref().filter(|_| !address.simulated)
-    else {
-        return Ok(());
-    };
-    let moves = |j: usize| {
-        let way = trajectory.extrema(j);
-        way.q_max.value - way.q_min.value > STILL_RAD
-    };
-    let unknown: Vec<String> = (0..JOINTS)
-        .filter(|j| moves(*j) && response.joints[*j].lag().is_none())
-        .map(|j| (j + 1).to_string())
-        .collect();
-    if unknown.is_empty() {
-        return Ok(());
-    }
-    Err(bad_input!(
-        "the {name} moves joint {}, of which `{}` does not tell how it follows: measure it with `wag latency --arm {} --excitation FILE` in a pose where it may move fast enough",
-        unknown.join(", "),
-        path.display(),
-        address.ip
-    ))
-}
-
-/// Joints that move by less stand still to the controller's monitors (rad).
-const STILL_RAD: f64 = 0.02;
 
 /// Moves to a trajectory's start and streams it, armed for the throw of a `plan` or for a wiggle;
 /// returns what was measured. Without an `address` it must be a dry run.
@@ -68,26 +35,8 @@ pub fn drive(
         Some(_) => OperatingMode::Throw,
         None => OperatingMode::Wiggle,
     };
-    let (name, word) = match operating_mode {
-        OperatingMode::Throw => ("throw", "THROW"),
-        OperatingMode::Wiggle | OperatingMode::SetUp => ("wiggle", "WIGGLE"),
-    };
-    if let Some(worst) = limits.worst_violation(trajectory) {
-        return Err(bad_input!(
-            "the {name} breaks a limit: {}",
-            worst.describe()
-        ));
-    }
-    let pole = config::cell().or_input()?.pole;
-    let armed = ArmedSpeed {
-        armed: operating_mode,
-        limits,
-        pole: &pole,
-        speeds: OperatingModeSpeeds::default(),
-    };
-    let slow_enough = armed.check(&Motion::Spline(*trajectory));
-    slow_enough.map_err(|why| bad_input!("the {name} is too fast: {why}"))?;
-    dry_run::refuse_stopped(address.as_ref(), limits, trajectory, name)?;
+    let (name, word) = motion::words(operating_mode);
+    motion::check(address.as_ref(), limits, trajectory, operating_mode)?;
     if arm.dry_run {
         out.map_or(Ok(()), RunFolder::refuse_existing)?;
         return dry_run::tell(arm, limits, trajectory, name).map(Some);
@@ -97,7 +46,7 @@ pub fn drive(
             "name the arm with --arm ADDR, or a controller that runs with --controller NAME"
         ));
     };
-    require_measured_joints(&address, trajectory, name)?;
+    motion::require_measured_joints(&address, trajectory, operating_mode)?;
     require_clear_area(arm, &address, "MOVE")?;
     let start = trajectory.start();
     let is_asked = asks(arm, &address);

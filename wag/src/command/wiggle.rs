@@ -1,6 +1,7 @@
 //! `wag wiggle`: the probing motion, written to a file or executed.
 
 use super::area::{limits, reach_measured};
+use super::run::wiggle_alone;
 use super::throw::drive;
 use super::wiggle_design;
 use crate::cli::WiggleArgs;
@@ -19,6 +20,9 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
         return Err(bad_input!(
             "choose what to do with the wiggle: --csv FILE writes it, --arm ADDR or --controller NAME executes it, --evaluate reports its information"
         ));
+    }
+    if args.camera.camera.is_some() && args.arm.names_arm() {
+        return wiggle_alone(args);
     }
     let address = reach_measured(&args.arm)?;
     let limits = limits(&args.arm, address.as_ref())?;

@@ -11,6 +11,7 @@ use anyhow::bail;
 use arm_model::Cell;
 use clap::ValueEnum;
 use layers::{Folders, difference};
+use run_log::files::CAMERA;
 use run_log::{CellHere, Run};
 use shared_types::Plan;
 use std::path::{Path, PathBuf};
@@ -80,12 +81,21 @@ pub fn here<T: Configured>(run: Option<&Path>) -> anyhow::Result<T> {
     Ok(config.in_cell(cell()?))
 }
 
-/// Where the file that tells how the arm of this place follows its setpoints is looked for: a
-/// rig's folder goes before a site's.
-pub fn arm_response_files() -> anyhow::Result<impl Iterator<Item = PathBuf>> {
+/// Where a file that belongs to this place is looked for: a rig's folder goes before a site's.
+fn places(file: &str) -> anyhow::Result<impl Iterator<Item = PathBuf>> {
     let Folders { site, rig } = Folders::here()?;
     let folders = [rig, site].into_iter().flatten();
-    Ok(folders.map(|folder| folder.join(RESPONSE_FILE)))
+    Ok(folders.map(move |folder| folder.join(file)))
+}
+
+/// Where the file that tells how the arm of this place follows its setpoints is looked for.
+pub fn arm_response_files() -> anyhow::Result<impl Iterator<Item = PathBuf>> {
+    places(RESPONSE_FILE)
+}
+
+/// The settings of the camera of this place, if they are there.
+pub fn camera_file() -> anyhow::Result<Option<PathBuf>> {
+    Ok(places(CAMERA)?.find(|file| file.exists()))
 }
 
 /// Refuses to begin with files that cannot be read as what they configure.

@@ -4,6 +4,7 @@ use anyhow::{anyhow, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use rt_controller::os::now_ns;
 use run_log::MotionSpan;
+use serde_json::{Value, json};
 use session::Session;
 use shared_types::OperatingMode;
 use shared_types::ipc::ControllerMode;
@@ -66,6 +67,14 @@ pub struct BringUp {
     /// What the operator should know: real-time properties that could not be had, settings of
     /// the arm that are allowed but unwise.
     pub warnings: Vec<String>,
+}
+
+impl BringUp {
+    /// The steps as a summary contains them.
+    pub fn steps_json(&self) -> Vec<Value> {
+        let step = |(step, result): &(String, String)| json!({ "step": step, "result": result });
+        self.steps.iter().map(step).collect()
+    }
 }
 
 /// Takes the operator's place, connects the arm and enables it; what was `found` on the way,

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, anyhow, bail, ensure};
 use rt_controller::ControllerConfig;
+use session::Session;
 use shared_types::FaultCode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::RpcClient;
@@ -50,7 +51,12 @@ impl Service {
     }
 
     /// Refuses a controller that was started anew with another configuration since it was found.
-    pub fn require_unchanged(&self, now: &ControllerEvent) -> anyhow::Result<()> {
+    pub fn require_unchanged(
+        &self,
+        session: &mut Session,
+        link: &RpcClient<ControllerRpc>,
+    ) -> anyhow::Result<()> {
+        let now = &session.ask(link, &ControllerRequest::Configuration, 5.0, |_| ())?;
         let same = configuration(now)? == self.config;
         ensure!(
             same,

@@ -1,4 +1,5 @@
-//! What a demo keeps of itself: every stage's figures, and the truth apart.
+//! What a run from wiggle to throw keeps of itself: every stage's figures, and the truth of a
+//! simulated one apart.
 
 use anyhow::bail;
 use serde::Serialize;
@@ -79,20 +80,20 @@ pub struct Settled {
     pub late_s: f64,
 }
 
-/// Everything a demo reports; `summary.json` and `--json`.
+/// Everything a run reports; `summary.json` and `--json`.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct DemoRecord {
+pub struct RunRecord {
     /// Whether the throw went through.
     pub ok: bool,
     command: &'static str,
     version: &'static str,
-    /// Seed of the hidden rope, the target, the noise and every search.
+    /// Seed of every search; of a demo's hidden rope, target and noise, too.
     pub seed: u64,
     /// The run's folder.
     pub run: String,
     task: &'static str,
-    /// Target in the arm's base frame (m).
-    pub target_m: [f64; 3],
+    /// Target in the arm's base frame (m); none of a wiggle alone.
+    pub target_m: Option<[f64; 3]>,
     /// What went wrong.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
@@ -105,7 +106,7 @@ pub struct DemoRecord {
     /// Instant that times in the run's files count from (CLOCK_MONOTONIC, ns): the
     /// wiggle's first frame, or the throw's where there was no wiggle.
     epoch_ns: u64,
-    /// Wall time of the whole demo (s).
+    /// Wall time of the whole run (s).
     pub wall_s: f64,
     /// Wall time of each stage.
     pub stages: StageTimes,
@@ -128,18 +129,29 @@ pub struct DemoRecord {
     pub latency: Option<LatencyReport>,
     /// What the real-time set-up could not get, and what is poor about the plan.
     pub warnings: Vec<String>,
+    /// Who operated the arm, where somebody had to.
+    pub operator: Option<String>,
+    /// The words by which motions were confirmed, and when.
+    pub confirmed: Vec<Value>,
+    /// Steps of the arm's bring-up and their results.
+    pub bring_up: Vec<Value>,
     truth: Option<Value>,
     /// The rope as it is.
     #[serde(skip)]
     pub true_rope: Option<RopeParams>,
 }
 
-impl DemoRecord {
-    /// Nothing yet, of a run in this folder.
+impl RunRecord {
+    /// Nothing yet, of a command's run in this folder.
     #[must_use]
-    pub fn new(seed: u64, target_m: [f64; 3], folder: &Path) -> Self {
+    pub fn new(
+        command: &'static str,
+        seed: u64,
+        target_m: Option<[f64; 3]>,
+        folder: &Path,
+    ) -> Self {
         Self {
-            command: "demo",
+            command,
             version: shared_types::VERSION,
             seed,
             run: folder.display().to_string(),
@@ -183,8 +195,7 @@ impl DemoRecord {
         }
     }
 
-    /// Keeps the truth, known only because the rig is simulated; the throw is complete
-    /// with it.
+    /// Keeps the truth, known only because the rig is simulated.
     ///
     /// # Errors
     /// The rig failed.
@@ -203,7 +214,6 @@ impl DemoRecord {
                     "rope": rope, "closest_m": closest_m, "peak_tip_speed_m_s": peak_tip_speed_m_s,
                     "rope_touched_robot": touched,
                 }));
-                self.ok = true;
                 Ok(())
             }
             RigEvent::Failed { message } => bail!(message),

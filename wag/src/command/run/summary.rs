@@ -1,9 +1,9 @@
-//! What a demo shows at its end.
+//! What a run shows at its end.
 
 use crate::command::latency::loop_table;
 use cli_output::table;
 use comfy_table::Table;
-use run_log::DemoRecord;
+use run_log::{Film, RunRecord};
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
 use shared_types::{RopeEstimate, RopeParams};
 
@@ -22,7 +22,12 @@ fn rope_table(estimate: &RopeEstimate, truth: &RopeParams) -> Table {
     table::numbers(header, 1, rows)
 }
 
-pub fn show(record: &DemoRecord) {
+/// One line about a film.
+pub fn of_film(film: &Film) -> String {
+    format!("{} frames, {} dropped", film.frames, film.dropped)
+}
+
+pub fn show(record: &RunRecord) {
     if let (Some(estimate), Some(truth)) = (&record.identified, &record.true_rope) {
         println!("{}", rope_table(estimate, truth));
         println!(
@@ -57,10 +62,12 @@ pub fn show(record: &DemoRecord) {
     }
     let cm =
         |v: Option<f64>| v.map_or_else(|| "unknown".to_owned(), |m| format!("{:.1} cm", 100.0 * m));
-    let [x, y, z] = record.target_m;
+    let Some([x, y, z]) = record.target_m else {
+        println!("run folder: {}", record.run);
+        return;
+    };
     println!("target ({x:.3}, {y:.3}, {z:.3}) m, closest approach of the tip:");
     let planned = cm(record.planned_tip_target_distance_m);
-    let achieved = cm(record.true_tip_target_distance_m);
     println!("  planned      {planned}");
     let interval = record
         .plan
@@ -70,7 +77,10 @@ pub fn show(record: &DemoRecord) {
         let [low, high] = [low, high].map(|m| 100.0 * m);
         println!("  forecast     {low:.1} to {high:.1} cm in nine of ten");
     }
-    println!("  achieved     {achieved}   (the simulator's truth)");
+    if record.true_tip_target_distance_m.is_some() {
+        let achieved = cm(record.true_tip_target_distance_m);
+        println!("  achieved     {achieved}   (the simulator's truth)");
+    }
     match (&record.score, &record.score_failed) {
         (Some(score), _) => println!(
             "  by camera    {}   ({:.1} to {:.1} cm)",

@@ -1,21 +1,22 @@
-//! What the demo makes of the film of the wiggle: the rope, a plan for it, and a move
+//! What a run makes of the film of the wiggle: the rope, a plan for it, and a move
 //! that brings it to rest.
 
-use super::Demo;
+use super::stages::{Run, Setup};
+use crate::command::known_rope::KnownRope;
 use crate::command::network::warning_of_pole;
 use crate::command::plan::describe;
 use crate::command::unconfirmed::confirm;
 use crate::pipeline::{arm_simulated, execute};
-use anyhow::{anyhow, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use cli_output::Stage;
-use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, warnings};
+use planner::plan::{PlanOptions, PlanRequest, warnings};
 use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
 use planner::settle::SettleRequest;
 use rt_controller::os::now_ns;
 use run_log::{Film, Settled, Tracked, files};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, RopeAppearance};
-use shared_types::{MonotonicNs, OperatingMode, Plan, RopeEstimate, Task};
+use shared_types::{MonotonicNs, OperatingMode, Plan, RopeParams, Task};
 use std::time::Duration;
 
 /// The joint that wiggles (0-based).
@@ -35,7 +36,7 @@ const SETTLED_S: f64 = 60.0;
 /// controller's bridge and half a cycle.
 const HANDOVER_S: f64 = 0.005;
 
-impl Demo<'_> {
+impl Run<'_> {
     /// Asks the planner; its last event, unless that is a failure.
     fn ask_planner(
         &mut self,
@@ -73,19 +74,15 @@ impl Demo<'_> {
     }
 
     /// Tracks the rope through the film; keypoints go out over shared memory.
-    pub fn track(
-        &mut self,
-        film: &Film,
-        accept_unconfirmed: bool,
-    ) -> anyhow::Result<RopeAppearance> {
+    pub fn track(&mut self, film: &Film) -> anyhow::Result<RopeAppearance> {
         let stage = Stage::begin("track");
         let overlay = self.folder.file("wiggle.png").display().to_string();
         let joints = self.film_joints(film)?;
         self.session.received.keypoints.clear();
         let request = CameraRequest::Track {
-            camera: Box::new(self.calibration.clone()),
+            camera: Box::new(self.setup.scene.camera.clone()),
             joints,
-            pole: self.settings.cell.pole,
+            pole: self.setup.settings.cell.pole,
             keypoints: KEYPOINTS,
             overlay: Some(overlay.clone()),
         };
@@ -112,7 +109,7 @@ impl Demo<'_> {
         let (unconfirmed, appearance) = (tracked.unconfirmed.clone(), tracked.appearance);
         self.record.track = Some(tracked);
         let look = format!("look at `{overlay}`");
-        confirm(&unconfirmed, accept_unconfirmed, &look)?;
+        confirm(&unconfirmed, self.setup.accept_unconfirmed, &look)?;
         Ok(appearance)
     }
 
@@ -121,8 +118,9 @@ impl Demo<'_> {
         &mut self,
         film: &Film,
         appearance: RopeAppearance,
-    ) -> anyhow::Result<RopeEstimate> {
-        let (options, pole) = (self.settings.identify, self.settings.cell.pole);
+    ) -> anyhow::Result<KnownRope> {
+        let settings = &self.setup.settings;
+        let (options, pole) = (settings.identify, settings.cell.pole);
         if let Some(warning) = warning_of_pole(options.method, &pole) {
             self.warn(warning);
         }
@@ -130,7 +128,7 @@ impl Demo<'_> {
         let request = PlannerRequest::Identify(Box::new(IdentifyRequest {
             first_stamp_ns: film.first_stamp_ns,
             frames: film.frames,
-            camera: self.calibration.clone(),
+            camera: self.setup.scene.camera.clone(),
             joints: self.film_joints(film)?,
             pole,
             appearance: appearance.into(),
@@ -141,40 +139,59 @@ impl Demo<'_> {
             other => bail!("the planner process answered with {other:?}"),
         };
         let tracked = self.record.track.as_ref();
-        let unconfirmed = tracked.map_or(&[][..], |tracked| &tracked.unconfirmed);
-        files::write_rope_estimate(&self.folder.file(files::ROPE), &rope, unconfirmed)?;
+        let unconfirmed = tracked.map_or_else(Vec::new, |tracked| tracked.unconfirmed.clone());
         self.record.stages.identify_s = stage.done(&format!(
-            "length {:.3} m, residual {:.2} px, {} simulations",
-            rope.params.length_m, rope.residual_px, rope.simulations
+            "length {:.3} m, residual {:.2} px, film's clock {:+.1} ms, {} simulations",
+            rope.params.length_m,
+            rope.residual_px,
+            1e3 * rope.time_offset_s,
+            rope.simulations
         ));
         for warning in &rope.warnings {
             self.warn(warning);
         }
-        self.record.identified = Some(rope.clone());
+        self.record.arm_lag_s = self.lag_s(film);
+        let rope = KnownRope::identified(rope, unconfirmed);
+        self.keep_rope(&rope)?;
         Ok(rope)
     }
 
+    /// Keeps the rope in the run's folder.
+    pub fn keep_rope(&mut self, rope: &KnownRope) -> anyhow::Result<()> {
+        self.record.identified = rope.estimate().cloned();
+        rope.keep(&self.folder.file(files::ROPE))
+    }
+
     /// Plans the throw with what was identified.
-    pub fn plan(&mut self, rope: &RopeEstimate) -> anyhow::Result<Plan> {
+    pub fn plan(&mut self, rope: &KnownRope) -> anyhow::Result<Plan> {
         let stage = Stage::begin("plan");
         let options = PlanOptions {
             seed: self.record.seed,
-            ..self.settings.search
+            ..self.setup.settings.search
         };
-        let goal = self.settings.goal(Task::Strike, self.record.target_m);
-        let (found, forecast) = (&rope.posterior, PosteriorEnsemble::FORECAST);
+        let Setup {
+            settings,
+            limits,
+            robust,
+            ..
+        } = &self.setup;
+        let target_m = self.record.target_m.context("a throw needs a target")?;
+        let goal = settings.goal(Task::Strike, target_m);
         let request = PlannerRequest::Plan(Box::new(PlanRequest {
-            limits: self.limits.clone(),
-            cell: self.settings.cell,
-            ensemble: PosteriorEnsemble::drawn(&rope.params, found, 0, forecast, options.seed),
+            limits: limits.clone(),
+            cell: settings.cell,
+            ensemble: rope.ensemble(*robust, options.seed)?,
+            following: self.following.clone(),
             ..PlanRequest::new(goal, &rope.params, options)
         }));
-        let plan = match self.ask_planner(&request, PLANNING_S, &stage)? {
+        let mut plan = match self.ask_planner(&request, PLANNING_S, &stage)? {
             PlannerEvent::Planned(plan) => *plan,
             other => bail!("the planner process answered with {other:?}"),
         };
+        plan.unconfirmed.clone_from(&rope.unconfirmed);
         self.record.stages.plan_s = stage.done(&describe(&plan));
         self.keep_plan(&plan)?;
+        self.check_throw(&plan)?;
         Ok(plan)
     }
 
@@ -182,7 +199,7 @@ impl Demo<'_> {
     pub fn keep_plan(&mut self, plan: &Plan) -> anyhow::Result<()> {
         files::write_json(&self.folder.file(files::PLAN), plan)?;
         let csv = self.folder.file("plan.csv");
-        files::write_trajectory(&csv, &plan.trajectory, self.limits.period_s())?;
+        files::write_trajectory(&csv, &plan.trajectory, self.setup.limits.period_s())?;
         for warning in warnings(plan) {
             self.warn(&warning);
         }
@@ -190,19 +207,24 @@ impl Demo<'_> {
         Ok(())
     }
 
+    /// How late the arm followed its setpoints while it wiggled (s).
+    fn lag_s(&self, film: &Film) -> Option<f64> {
+        let span = [film.motion.start_ns, film.motion.end_ns];
+        let cycles = &self.session.received.cycles;
+        cycles.joint_lag_s(WIGGLE_JOINT, span)
+    }
+
     /// Turns towards the target so that the rope comes to rest: by a move planned with the
     /// identified rope and begun at the instant it was planned for.
     pub fn settle(
         &mut self,
-        rope: &RopeEstimate,
+        rope: &RopeParams,
         film: &Film,
         wiggle: &JointTrajectory,
         plan: &Plan,
     ) -> anyhow::Result<()> {
         let stage = Stage::begin("settle");
-        let span = [film.motion.start_ns, film.motion.end_ns];
-        let cycles = &self.session.received.cycles;
-        let lag_s = cycles.joint_lag_s(WIGGLE_JOINT, span);
+        let lag_s = self.record.arm_lag_s;
         let mut settled = None;
         for planning_s in SETTLING_S {
             let begin = MonotonicNs(now_ns()).plus_s(planning_s);
@@ -216,8 +238,7 @@ impl Demo<'_> {
                 "planning a swing-damping move takes too long on this machine; stop other programs"
             )
         })?;
-        self.wait_still(&stage)?;
-        self.record.arm_lag_s = lag_s;
+        self.wait_settled(&stage)?;
         self.record.settle = Some(settled);
         self.record.stages.settle_s = stage.done(&format!(
             "swing {:.1} cm -> {:.1} cm",
@@ -232,7 +253,7 @@ impl Demo<'_> {
     fn settle_at(
         &mut self,
         (begin, lag_s): (MonotonicNs, Option<f64>),
-        (rope, film, wiggle, plan): (&RopeEstimate, &Film, &JointTrajectory, &Plan),
+        (rope, film, wiggle, plan): (&RopeParams, &Film, &JointTrajectory, &Plan),
         stage: &Stage,
     ) -> anyhow::Result<Option<Settled>> {
         self.session.received.drain()?;
@@ -246,15 +267,15 @@ impl Demo<'_> {
             .map(|(stamp_ns, q)| (MonotonicNs(*stamp_ns).since_s(epoch), *q))
             .unzip();
         let request = PlannerRequest::Settle(Box::new(SettleRequest {
-            rope: rope.params,
+            rope: *rope,
             times_s,
             q,
             start_s: start.since_s(epoch),
             start_q: wiggle.end(),
             end_q: plan.trajectory.start(),
-            limits: self.limits.clone(),
-            cell: self.settings.cell,
-            config: self.settings.settle.clone(),
+            limits: self.setup.limits.clone(),
+            cell: self.setup.settings.cell,
+            config: self.setup.settings.settle.clone(),
         }));
         stage.say("planning");
         let found = match self.ask_planner(&request, SETTLED_S, stage)? {

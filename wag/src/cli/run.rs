@@ -1,0 +1,149 @@
+//! Arguments of what goes from wiggle to throw: run, demo.
+
+use super::values::{Colour, mass_kg, one_of};
+use super::{ArmArgs, Point};
+use clap::{ArgGroup, Args};
+use cli_output::seed;
+use shared_types::Task;
+use std::path::PathBuf;
+
+/// What films.
+#[derive(Debug, Args)]
+pub struct CameraArgs {
+    /// Who films: the shared-memory domain of a camera that runs (`wag rig --camera DOMAIN`,
+    /// `wag process camera`), or a device of this machine, /dev/videoN.
+    #[arg(long, value_name = "DOMAIN|DEVICE")]
+    pub camera: Option<String>,
+    /// Calibration and extrinsics of that camera (camera.toml). Default: camera.toml in the folder
+    /// of configurations (~/.config/wag); a simulated rig tells its own.
+    #[arg(long, value_name = "FILE", requires = "camera")]
+    pub calibration: Option<PathBuf>,
+    /// Frames per second of a device.
+    #[arg(long, default_value_t = 60, requires = "camera")]
+    pub fps: u32,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    group(ArgGroup::new("entry").args(["from", "again"])),
+    after_help = "EXAMPLES:\n  \
+        wag run strike --arm 192.168.1.200 --camera /dev/video0 --target 0.9,0,0.3\n  \
+        wag run --from plan runs/RUN --arm 192.168.1.200 --camera /dev/video0\n  \
+        wag run --again runs/RUN --arm 192.168.1.200 --camera /dev/video0\n\n\
+        Rehearsal: `wag rig --rope random --camera lab` in another terminal, then\n  \
+        wag run strike --arm 127.0.0.1 --camera lab"
+)]
+pub struct RunArgs {
+    /// What the throw is for.
+    #[arg(default_value = "strike", value_parser = one_of([
+        ("strike", "The tip passes through the target", Task::Strike),
+        ("lob", "", Task::Lob),
+        ("drape", "", Task::Drape),
+    ]))]
+    pub task: Task,
+    #[command(flatten)]
+    pub camera: CameraArgs,
+    /// Target x,y,z in the arm's base frame (m). Default: that of the run gone on with; in front of
+    /// a simulated rig's camera, one drawn from the seed, where the rig puts its ball.
+    #[arg(long, allow_hyphen_values = true)]
+    pub target: Option<Point>,
+    /// Go on with an earlier run, from one of these stages: identify (its keypoints), plan (its
+    /// rope), throw (its plan).
+    #[arg(
+        long,
+        num_args = 2,
+        value_names = ["STAGE", "RUN"],
+    )]
+    pub from: Vec<String>,
+    /// Throw the strike of this run again, changed so that its miss is taken out.
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["target", "lead_mass", "length", "robust"])]
+    pub again: Option<PathBuf>,
+    /// Colour of the target, R,G,B from 0 to 255: by it the film of the throw tells how much it
+    /// missed.
+    #[arg(long)]
+    pub target_rgb: Option<Colour>,
+    /// Colour of the tip, R,G,B from 0 to 255. Default: as it was tracked through the wiggle.
+    #[arg(long)]
+    pub tip_rgb: Option<Colour>,
+    /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
+    #[arg(long, allow_negative_numbers = true, value_parser = mass_kg)]
+    pub lead_mass: Option<f64>,
+    /// Length of the rope measured by tape, clamp to lead centre (m); taken to be right to 2 mm.
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub length: Option<f64>,
+    /// Plan for this many ropes drawn from the posterior of identification.
+    #[arg(long, default_value_t = 0, value_name = "K")]
+    pub robust: usize,
+    /// Go on although the track of the rope is unconfirmed.
+    #[arg(long)]
+    pub accept_unconfirmed: bool,
+    /// Seed of every search.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: u64,
+    #[command(flatten)]
+    pub arm: ArmArgs,
+    /// Folder for the run; it must not exist. Default: runs/TIME-run.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+}
+
+/// Where an earlier run is gone on with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FromStage {
+    Identify,
+    Plan,
+    Throw,
+}
+
+impl RunArgs {
+    /// Which run is gone on with, and from where; `Err` says what is known instead.
+    pub fn from(&self) -> Result<Option<(FromStage, PathBuf)>, String> {
+        let [stage, run] = self.from.as_slice() else {
+            return Ok(None);
+        };
+        let stage = match stage.as_str() {
+            "identify" => FromStage::Identify,
+            "plan" => FromStage::Plan,
+            "throw" => FromStage::Throw,
+            other => {
+                return Err(format!(
+                    "--from {other}: the stages that can be gone on from are identify, plan and throw"
+                ));
+            }
+        };
+        Ok(Some((stage, run.into())))
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// What the throw is for; the rig has a scene for strikes only so far.
+    #[arg(long, default_value = "strike", value_parser = one_of([
+        ("strike", "The tip passes through the target", Task::Strike),
+        ("lob", "", Task::Lob),
+        ("drape", "", Task::Drape),
+    ]))]
+    pub task: Task,
+    /// Seed of the hidden rope, the target, the noise and every search.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: u64,
+    /// Folder for the run; it must not exist. Default: runs/TIME-demo-SEED.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Target x,y,z in the arm's base frame (m); default: random from the seed.
+    #[arg(long, allow_hyphen_values = true)]
+    pub target: Option<Point>,
+    /// Set-up of the simulated rig (TOML), as configs/rig/demo.toml; default: that
+    /// file. Domain, seed, ports and target are the demo's own.
+    #[arg(long, value_name = "FILE")]
+    pub rig_config: Option<PathBuf>,
+    /// Go on although the track of the rope is unconfirmed.
+    #[arg(long)]
+    pub accept_unconfirmed: bool,
+    /// Throw at the target of this demo again, with its rope, corrected by the miss that its
+    /// camera measured; again for a third throw, with the run of the second.
+    #[arg(long, value_name = "RUN", conflicts_with_all = [
+        "task", "seed", "target", "rig_config", "accept_unconfirmed",
+    ])]
+    pub again: Option<PathBuf>,
+}

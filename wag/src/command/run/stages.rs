@@ -1,0 +1,429 @@
+//! The stages of a run from wiggle to throw: each hands the next what it found.
+
+use super::summary;
+use crate::command::known_rope::KnownRope;
+use crate::command::motion;
+use crate::command::on_arm::AT_START;
+use crate::pipeline::{self, ArmAddress, ArmLink, BringUp, FramesFrom, RunFolder, Scene, execute};
+use anyhow::{anyhow, bail};
+use arm_model::{JointTrajectory, Limits};
+use cli_output::{Failure, Stage, output};
+use planner::PlannerConfig;
+use planner::arm_response::Following;
+use planner::plan::{Shortcoming, shortcoming};
+use planner::service::{PlannerRequest, PlannerRpc};
+use planner::wiggle::wiggle;
+use rt_controller::os::now_ns;
+use run_log::{Film, RunRecord};
+use session::Session;
+use shared_types::ipc::message::{
+    CameraEvent, CameraRequest, CameraRpc, RigRequest, RigRpc, RopeAppearance,
+};
+use shared_types::ipc::rpc::RpcClient;
+use shared_types::{OperatingMode, Plan};
+
+/// Speed of moves between poses, as a part of the fastest move.
+///
+/// Slow enough that the move lasts several periods of the rope's pendulum and
+/// leaves it with millimetres of swing.
+const MOVE_SPEED: f64 = 0.04;
+/// Frames of a wiggle (paper: 400 at 60 Hz).
+const WIGGLE_FRAMES: u32 = 400;
+/// Frames of a throw: two and a half seconds.
+const THROW_FRAMES: u32 = 150;
+/// Time after the last setpoint that still belongs to the throw (ns).
+const AFTER_THROW_NS: u64 = 600_000_000;
+/// Longest wait for the rope to hang still (s); where nothing else damps its swing, which then
+/// decays by itself.
+const STILL_S: f64 = 3.0;
+const STILL_UNDAMPED_S: f64 = 30.0;
+/// How often the camera is asked for frames before the arm is enabled.
+const LOOKS: usize = 4;
+
+/// Where a run begins.
+#[derive(Debug)]
+pub enum Entry {
+    /// With the wiggle, and that is all.
+    WiggleAlone,
+    Wiggle,
+    /// The rope is known.
+    Rope(Box<KnownRope>),
+    /// So is the throw.
+    Plan(Box<Plan>),
+}
+
+/// What a run is to do, and with what.
+#[derive(Debug)]
+pub struct Setup {
+    pub settings: PlannerConfig,
+    pub limits: Limits,
+    pub address: ArmAddress,
+    /// Whether the operator must confirm each motion.
+    pub asks: bool,
+    /// Whether the operator knows why the arm was stopped before.
+    pub acknowledges: bool,
+    pub frames: FramesFrom,
+    pub scene: Scene,
+    pub rig: Option<RpcClient<RigRpc>>,
+    pub accept_unconfirmed: bool,
+    /// Ropes that a plan weighs beside the likeliest.
+    pub robust: usize,
+}
+
+/// The running processes and what all stages need.
+pub struct Run<'a> {
+    pub(super) folder: &'a RunFolder,
+    pub(super) session: &'a mut Session,
+    pub(super) record: &'a mut RunRecord,
+    pub(super) setup: Setup,
+    pub(super) following: Option<Following>,
+    camera: RpcClient<CameraRpc>,
+    pub(super) planner: RpcClient<PlannerRpc>,
+    pub(super) arm: ArmLink,
+}
+
+impl<'a> Run<'a> {
+    /// Starts what does not run yet, the controller last, and makes sure that the camera sees.
+    pub fn start(
+        folder: &'a RunFolder,
+        session: &'a mut Session,
+        record: &'a mut RunRecord,
+        setup: Setup,
+        stage: &Stage,
+    ) -> anyhow::Result<Self> {
+        let Setup { limits, scene, .. } = &setup;
+        scene.keep(folder)?;
+        let camera = Some(&scene.camera);
+        pipeline::start_recorder(session, folder, limits, camera, record.target_m)?;
+        let camera = pipeline::start_camera(session, folder, &setup.frames, scene)?;
+        let ping = PlannerRequest::Ping;
+        let planner = match session.find(&ping)? {
+            Some(running) => running,
+            None => {
+                let config = PlannerConfig {
+                    domain: folder.domain.clone(),
+                    ..setup.settings.clone()
+                };
+                pipeline::start(session, folder, "planner", &config, &ping)?
+            }
+        };
+        let arm = pipeline::controller(session, folder, limits, &setup.address)?;
+        let response = setup.address.arm_response.as_ref();
+        let following = response.map(|(_, response)| Following::new(response, limits));
+        let mut run = Self {
+            folder,
+            session,
+            record,
+            setup,
+            following,
+            camera,
+            planner,
+            arm,
+        };
+        run.look(stage)?;
+        run.record.stages.start_s = stage.done("controller, camera and planner are up");
+        Ok(run)
+    }
+
+    /// A camera that sends nothing is known before the arm is enabled.
+    fn look(&mut self, stage: &Stage) -> anyhow::Result<()> {
+        let request = CameraRequest::WaitStill { timeout_s: 0.0 };
+        let mut seen = Ok(());
+        for _ in 0..LOOKS {
+            seen = self.ask_camera(&request, 5.0, stage).map(drop);
+            if seen.is_ok() {
+                break;
+            }
+        }
+        seen
+    }
+
+    /// From the entry to its end: that of the throw, but for a wiggle alone.
+    pub fn go(&mut self, from: Entry) -> anyhow::Result<()> {
+        let plan = match from {
+            Entry::WiggleAlone => {
+                self.tracked()?;
+                self.record.ok = true;
+                return Ok(());
+            }
+            Entry::Plan(plan) => {
+                self.keep_plan(&plan)?;
+                self.bring_up(&plan.trajectory)?;
+                *plan
+            }
+            Entry::Rope(rope) => {
+                self.keep_rope(&rope)?;
+                let plan = self.plan(&rope)?;
+                self.bring_up(&plan.trajectory)?;
+                plan
+            }
+            Entry::Wiggle => {
+                let (motion, film, appearance) = self.tracked()?;
+                let rope = self.identify(&film, appearance)?;
+                let plan = self.plan(&rope)?;
+                if self.setup.asks {
+                    self.turn(&plan)?;
+                } else {
+                    self.settle(&rope.params, &film, &motion, &plan)?;
+                }
+                plan
+            }
+        };
+        let throw = self.throw(&plan)?;
+        self.score();
+        self.compare_with_truth(&throw)?;
+        self.record.ok = true;
+        Ok(())
+    }
+
+    /// Wiggles, films and tracks: motion, film, sizes of rope and lead.
+    fn tracked(&mut self) -> anyhow::Result<(JointTrajectory, Film, RopeAppearance)> {
+        let motion = wiggle(&self.setup.settings.wiggle, &self.setup.limits)?;
+        self.bring_up(&motion)?;
+        let film = self.wiggle(&motion)?;
+        let appearance = self.track(&film)?;
+        Ok((motion, film, appearance))
+    }
+
+    /// Tells a person, and keeps it in the summary.
+    pub(super) fn warn(&mut self, warning: &str) {
+        output::remark(format_args!("warning: {warning}"));
+        self.record.warnings.push(warning.to_owned());
+    }
+
+    /// Asks the camera; its last event, unless that is a failure.
+    pub(super) fn ask_camera(
+        &mut self,
+        request: &CameraRequest,
+        within_s: f64,
+        stage: &Stage,
+    ) -> anyhow::Result<CameraEvent> {
+        let event = self.session.ask(&self.camera, request, within_s, |event| {
+            if let CameraEvent::Progress(p) = event {
+                stage.progress(p);
+            }
+        })?;
+        answered(event)
+    }
+
+    /// Waits until nothing moves in the picture; whether that came about.
+    pub(super) fn wait_still(&mut self, stage: &Stage, timeout_s: f64) -> anyhow::Result<bool> {
+        stage.say("waiting for the rope to hang still");
+        let request = CameraRequest::WaitStill { timeout_s };
+        match self.ask_camera(&request, timeout_s + 5.0, stage)? {
+            CameraEvent::Still { still } => Ok(still),
+            other => bail!("the camera process answered with {other:?}"),
+        }
+    }
+
+    /// The same after a move that damped nothing or was planned to.
+    pub(super) fn wait_settled(&mut self, stage: &Stage) -> anyhow::Result<bool> {
+        let undamped = self.setup.asks;
+        self.wait_still(stage, if undamped { STILL_UNDAMPED_S } else { STILL_S })
+    }
+
+    /// Arms for a wiggle or a throw, which the operator confirms where somebody must.
+    pub(super) fn arm_for(&mut self, operating_mode: OperatingMode) -> anyhow::Result<()> {
+        let confirmed_ns = if self.setup.asks {
+            self.session
+                .confirm(AT_START, motion::words(operating_mode).1)?
+        } else {
+            now_ns()
+        };
+        self.session.await_hold()?;
+        pipeline::arm_for(self.session, &self.arm, operating_mode, Some(confirmed_ns))
+    }
+
+    /// Enables the arm, moves to the start pose, waits for the rope.
+    fn bring_up(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
+        let stage = Stage::begin("bring-up");
+        self.session.take_operator()?;
+        if let Some(service) = &self.setup.address.service {
+            service.require_unchanged(self.session, &self.arm)?;
+        }
+        let mut found = BringUp::default();
+        let acknowledges = self.setup.acknowledges;
+        let enabled = pipeline::enable(self.session, &self.arm, acknowledges, &mut found);
+        self.record.bring_up = found.steps_json();
+        for warning in &found.warnings {
+            tracing::warn!("{warning}");
+        }
+        self.record.warnings.extend(found.warnings);
+        enabled?;
+        self.move_to_start(motion)?;
+        let still = self.wait_settled(&stage)?;
+        let confirmation = if self.setup.address.simulated && !self.setup.asks {
+            " (simulated: no confirmation needed)"
+        } else {
+            ""
+        };
+        self.record.stages.bringup_s = stage.done(&if still {
+            format!("arm enabled{confirmation}, rope hangs still")
+        } else {
+            format!("arm enabled{confirmation}, rope still swings a little")
+        });
+        Ok(())
+    }
+
+    fn move_to_start(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
+        self.session.await_hold()?;
+        pipeline::arm_for(self.session, &self.arm, OperatingMode::SetUp, None)?;
+        pipeline::move_to(self.session, &self.arm, motion.start(), MOVE_SPEED)?;
+        Ok(())
+    }
+
+    /// Turns to the throw's start at set-up speed, and waits for the rope.
+    fn turn(&mut self, plan: &Plan) -> anyhow::Result<()> {
+        let stage = Stage::begin("settle");
+        self.move_to_start(&plan.trajectory)?;
+        let still = self.wait_settled(&stage)?;
+        if !still {
+            self.warn(
+                "the rope still swings at the throw's start, of which the plan knows nothing",
+            );
+        }
+        self.record.stages.settle_s = stage.done("arm stands at the throw's start");
+        Ok(())
+    }
+
+    /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
+    /// finished whatever becomes of the film, of both eyes. A wiggle is made for the film's
+    /// sake, which needs the left eye only, and is braked when it is lost.
+    fn film(
+        &mut self,
+        frames: u32,
+        trajectory: &JointTrajectory,
+        throw: bool,
+        stage: &Stage,
+    ) -> anyhow::Result<Film> {
+        let request = CameraRequest::Record {
+            frames,
+            both_images: throw,
+        };
+        let recording = self.camera.call(&request)?;
+        let first_stamp_ns = match answered(self.session.next(&recording, 5.0)?)? {
+            CameraEvent::Recording { first_stamp_ns } => first_stamp_ns,
+            other => bail!("the camera process answered a recording with {other:?}"),
+        };
+        let stream = |session: &mut Session| execute(session, &self.arm, trajectory);
+        let motion = if throw {
+            self.session.committed(stream)?
+        } else {
+            stream(self.session)?
+        };
+        let within_s = f64::from(frames) / 15.0 + 5.0;
+        let event = self.session.finish(&recording, within_s, |event| {
+            if let CameraEvent::Progress(p) = event {
+                stage.progress(p);
+            }
+        })?;
+        match answered(event)? {
+            CameraEvent::Recorded {
+                frames, dropped, ..
+            } => Ok(Film {
+                first_stamp_ns,
+                frames,
+                dropped,
+                motion,
+            }),
+            other => bail!("the camera process answered a recording with {other:?}"),
+        }
+    }
+
+    /// Streams the wiggle and films it.
+    fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
+        self.arm_for(OperatingMode::Wiggle)?;
+        let stage = Stage::begin("wiggle");
+        let film = self.film(WIGGLE_FRAMES, wiggle, false, &stage)?;
+        self.record.set_wiggle(film);
+        self.record.stages.wiggle_s = stage.done(&summary::of_film(&film));
+        Ok(film)
+    }
+
+    /// Refuses a throw that must not be sent, or that would not do what it is for; on a simulated
+    /// arm the latter is but a warning.
+    pub(super) fn check_throw(&self, plan: &Plan) -> anyhow::Result<()> {
+        let (trajectory, address) = (&plan.trajectory, &self.setup.address);
+        let refused = |failure: Failure| anyhow!("{failure}");
+        motion::check(
+            Some(address),
+            &self.setup.limits,
+            trajectory,
+            OperatingMode::Throw,
+        )
+        .map_err(refused)?;
+        motion::require_measured_joints(address, trajectory, OperatingMode::Throw)
+            .map_err(refused)?;
+        match shortcoming(plan) {
+            Some(Shortcoming { message, is_severe }) if is_severe && !address.simulated => {
+                bail!("{message}; nothing is thrown")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Throws once, open loop, filmed.
+    fn throw(&mut self, plan: &Plan) -> anyhow::Result<Film> {
+        self.arm_for(OperatingMode::Throw)?;
+        let stage = Stage::begin("throw");
+        // Empties the histograms, so that they hold this throw alone.
+        pipeline::latency(self.session, &self.arm)?;
+        let film = self.film(THROW_FRAMES, &plan.trajectory, true, &stage)?;
+        self.record.set_throw(film);
+        self.record.latency = Some(pipeline::latency(self.session, &self.arm)?);
+        self.record.stages.throw_s = stage.done(&summary::of_film(&film));
+        Ok(film)
+    }
+
+    /// Measures the closest approach of tip and target by the camera. That it could not
+    /// see the throw does not undo the throw; it is reported.
+    fn score(&mut self) {
+        let scene = &self.setup.scene;
+        let tracked = self.record.track.as_ref();
+        let tip_rgb = scene
+            .tip_rgb
+            .or(tracked.map(|track| track.appearance.lead_rgb));
+        let Some((tip_rgb, target_rgb)) = tip_rgb.zip(scene.target_rgb) else {
+            let unnamed = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
+            return self.record.set_score(Err(anyhow!(unnamed)));
+        };
+        let stage = Stage::begin("score");
+        let request = CameraRequest::Score {
+            camera: Box::new(self.setup.scene.camera.clone()),
+            tip_rgb,
+            target_rgb,
+            strobe: Some(self.folder.file("throw.png").display().to_string()),
+        };
+        let score = match self.ask_camera(&request, 60.0, &stage) {
+            Ok(CameraEvent::Scored(score)) => Ok(score),
+            Ok(other) => Err(anyhow!("the camera process answered with {other:?}")),
+            Err(reason) => Err(reason),
+        };
+        self.record.stages.score_s = stage.done(&match &score {
+            Ok(s) => format!("by camera {:.1} cm", 100.0 * s.closest_m),
+            Err(_) => "the camera could not measure the throw".to_owned(),
+        });
+        self.record.set_score(score);
+    }
+
+    /// Only now a rig is asked what really happened.
+    fn compare_with_truth(&mut self, throw: &Film) -> anyhow::Result<()> {
+        let Some(rig) = &self.setup.rig else {
+            return Ok(());
+        };
+        let request = RigRequest::Truth {
+            from_ns: throw.motion.start_ns,
+            to_ns: throw.motion.end_ns + AFTER_THROW_NS,
+        };
+        let truth = self.session.ask(rig, &request, 10.0, |_| ())?;
+        self.record.set_truth(truth)
+    }
+}
+
+/// An event of the camera that is no failure.
+fn answered(event: CameraEvent) -> anyhow::Result<CameraEvent> {
+    match event {
+        CameraEvent::Failed { message } => bail!(message),
+        event => Ok(event),
+    }
+}
