@@ -56,7 +56,8 @@ pub fn run(args: &RigArgs) -> Outcome<Option<Value>> {
             }
             // Goes last: nothing of the domain stays once the rig is gone.
             let _sweep = DomainSweep::new(&config.domain);
-            let announce = |ports| announce(config.bind, ports);
+            let camera = args.camera.as_deref();
+            let announce = |ports| announce(config.bind, ports, camera);
             run_announced(&config, interrupted(), announce).map_err(Failure::of_server)?;
         }
     }
@@ -65,7 +66,7 @@ pub fn run(args: &RigArgs) -> Outcome<Option<Value>> {
 
 /// Says where the arm listens as soon as it does: whoever starts a rig waits for
 /// its ports, not for its end.
-fn announce(bind: IpAddr, ports: ArmPorts) {
+fn announce(bind: IpAddr, ports: ArmPorts, camera: Option<&str>) {
     output::object(&json!({
         "ok": true, "command": "rig", "bind": bind,
         "command_port": ports.command, "report_ports": ports.reports,
@@ -75,10 +76,14 @@ fn announce(bind: IpAddr, ports: ArmPorts) {
         ports.command, ports.reports
     );
     let [joints, _, status, _] = ports.reports;
-    println!(
-        "drive it with --arm {bind} --command-port {} --report-port {joints} --status-port {status}",
+    let arm = format!(
+        "--arm {bind} --command-port {} --report-port {joints} --status-port {status}",
         ports.command
     );
+    match camera {
+        Some(domain) => println!("from wiggle to throw: wag run strike {arm} --camera {domain}"),
+        None => println!("drive it with {arm}"),
+    }
 }
 
 fn arm_alone(
@@ -96,7 +101,7 @@ fn arm_alone(
         cell: Some(cell),
         ..ArmConfig::default()
     })?;
-    announce(args.bind, arm.ports());
+    announce(args.bind, arm.ports(), None);
     while !is_interrupted() {
         std::thread::sleep(Duration::from_millis(50));
     }

@@ -12,6 +12,7 @@ use session::{ProcessSpec, Session};
 use shared_types::StereoCamera;
 use shared_types::ipc::message::{CameraRequest, CameraRpc, RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
+use shared_types::ipc::{Bus, DomainSweep, IpcError};
 use std::path::{Path, PathBuf};
 
 /// Where frames come from.
@@ -106,6 +107,21 @@ pub fn start_camera(
             &IngestConfig { domain },
             &ping,
         ),
+    }
+}
+
+/// Whether a simulated rig runs in a shared-memory domain.
+///
+/// # Errors
+/// The name is none, or shared memory cannot be used.
+pub fn has_rig(domain: &str) -> anyhow::Result<bool> {
+    // Removed last: it looks for others in the domain.
+    let _sweep = DomainSweep::new(domain);
+    let bus = Bus::join(domain)?;
+    match RpcClient::<RigRpc>::open(&bus)?.call(&RigRequest::Ports) {
+        Ok(_) => Ok(true),
+        Err(IpcError::Gone { .. }) => Ok(false),
+        Err(error) => Err(error.into()),
     }
 }
 

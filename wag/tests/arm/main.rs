@@ -4,6 +4,7 @@
 mod guardian;
 mod recorded;
 mod rig;
+mod run;
 mod service;
 #[path = "../support/mod.rs"]
 mod support;

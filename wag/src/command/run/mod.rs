@@ -17,10 +17,10 @@ use super::unconfirmed::confirm;
 use super::{dry_run, identify, motion};
 use crate::cli::{ArmArgs, CameraArgs, FromStage, RunArgs, WiggleArgs};
 use crate::config;
-use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene, find_rig};
-use anyhow::{Context, anyhow, ensure};
-use arm_model::Limits;
-use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
+use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene, find_rig, has_rig};
+use anyhow::{Context, bail, ensure};
+use arm_model::{JointTrajectory, Limits};
+use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
 use planner::PlannerConfig;
 use planner::plan::{check_reach, clear_of_arm};
 use planner::wiggle::wiggle;
@@ -98,14 +98,20 @@ fn camera(args: &CameraArgs) -> Outcome<(FramesFrom, Option<StereoCamera>)> {
         FramesFrom::Domain(named.clone())
     };
     if calibration.is_none() && matches!(from, FramesFrom::Device(..)) {
-        return Err(uncalibrated());
+        return Err(uncalibrated(&from));
     }
     Ok((from, calibration))
 }
 
-fn uncalibrated() -> cli_output::Failure {
+fn uncalibrated(from: &FramesFrom) -> Failure {
+    let nobody = match from {
+        FramesFrom::Domain(domain) => {
+            format!("no simulated rig films in domain `{domain}`, and where another camera ")
+        }
+        FramesFrom::Device(..) => "where the camera ".to_owned(),
+    };
     bad_input!(
-        "where the camera stands is not known: name its camera.toml with --calibration, or put it into the folder of configurations (~/.config/wag); `wag calib extrinsics` estimates it"
+        "{nobody}stands is not known: name its camera.toml with --calibration, or put it into the folder of configurations (~/.config/wag); `wag calib extrinsics` estimates it"
     )
 }
 
@@ -165,10 +171,7 @@ pub fn run(args: &RunArgs) -> Outcome<Option<Value>> {
     }
     let settings = settings(args)?;
     if args.arm.dry_run {
-        let limits = limits(&args.arm, None)?;
-        let trajectory = wiggle(&settings.wiggle, &limits).or_failed()?;
-        motion::check(None, &limits, &trajectory, OperatingMode::Wiggle)?;
-        return dry_run::tell(&args.arm, &limits, &trajectory, "wiggle").map(Some);
+        return tell(args, &settings);
     }
     if !args.arm.names_arm() {
         return Err(bad_input!(
@@ -200,6 +203,7 @@ pub fn run(args: &RunArgs) -> Outcome<Option<Value>> {
     let filmed = Filmed {
         frames,
         calibration,
+        names_calibration: args.camera.calibration.is_some(),
         target_m: named.or(earlier),
         colours: [args.tip_rgb, args.target_rgb].map(|named| named.map(|colour| colour.0)),
         accept_unconfirmed: args.accept_unconfirmed,
@@ -222,6 +226,7 @@ pub fn wiggle_alone(args: &WiggleArgs) -> Outcome<Option<Value>> {
     let filmed = Filmed {
         frames,
         calibration,
+        names_calibration: args.camera.calibration.is_some(),
         target_m: None,
         colours: [None; 2],
         accept_unconfirmed: args.accept_unconfirmed,
@@ -232,6 +237,36 @@ pub fn wiggle_alone(args: &WiggleArgs) -> Outcome<Option<Value>> {
     on_camera(&args.arm, with, filmed, place, Entry::WiggleAlone)
 }
 
+/// Tells what would be done first, and checks it.
+fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
+    let limits = limits(&args.arm, None)?;
+    let (first, _) = entry(args, settings)?;
+    let Some((trajectory, operating_mode)) = first_motion(&first, &limits, settings)? else {
+        println!("the throw is planned with the rope first, and checked then");
+        return Ok(None);
+    };
+    motion::check(None, &limits, &trajectory, operating_mode)?;
+    let (name, _) = motion::words(operating_mode);
+    dry_run::tell(&args.arm, &limits, &trajectory, name).map(Some)
+}
+
+/// The first motion of a run but for moves at set-up speed, where it is known.
+fn first_motion(
+    entry: &Entry,
+    limits: &Limits,
+    settings: &PlannerConfig,
+) -> Outcome<Option<(JointTrajectory, OperatingMode)>> {
+    Ok(match entry {
+        Entry::Plan(plan) => Some((plan.trajectory, OperatingMode::Throw)),
+        Entry::Wiggle | Entry::WiggleAlone => {
+            let trajectory = wiggle(&settings.wiggle, limits).or_failed()?;
+            Some((trajectory, OperatingMode::Wiggle))
+        }
+        // Its throw is still to be planned.
+        Entry::Rope(_) => None,
+    })
+}
+
 /// Refuses the first motion of a run if it must not be sent.
 fn check_first(
     entry: &Entry,
@@ -239,14 +274,8 @@ fn check_first(
     limits: &Limits,
     settings: &PlannerConfig,
 ) -> Outcome {
-    let (trajectory, operating_mode) = match entry {
-        Entry::Plan(plan) => (plan.trajectory, OperatingMode::Throw),
-        Entry::Wiggle | Entry::WiggleAlone => {
-            let trajectory = wiggle(&settings.wiggle, limits).or_failed()?;
-            (trajectory, OperatingMode::Wiggle)
-        }
-        // Its throw is still to be planned.
-        Entry::Rope(_) => return Ok(()),
+    let Some((trajectory, operating_mode)) = first_motion(entry, limits, settings)? else {
+        return Ok(());
     };
     motion::check(Some(address), limits, &trajectory, operating_mode)?;
     motion::require_measured_joints(address, &trajectory, operating_mode)
@@ -263,6 +292,8 @@ fn reach_for_run(arm: &ArmArgs) -> Outcome<(ArmAddress, Limits)> {
 struct Filmed {
     frames: FramesFrom,
     calibration: Option<StereoCamera>,
+    /// Whether the command line names that calibration: then it goes before a simulated rig's.
+    names_calibration: bool,
     target_m: Option<[f64; 3]>,
     /// Of tip and target.
     colours: [Option<[u8; 3]>; 2],
@@ -281,6 +312,16 @@ fn on_camera(
     check_first(&entry, &address, &limits, &settings)?;
     require_clear_area(arm, &address, "MOVE")?;
     let operator = operator(arm, &address)?;
+    let simulated = match &filmed.frames {
+        FramesFrom::Domain(domain) => has_rig(domain).or_failed()?,
+        FramesFrom::Device(..) => false,
+    };
+    if !simulated && filmed.calibration.is_none() {
+        return Err(uncalibrated(&filmed.frames));
+    }
+    if !simulated && filmed.target_m.is_none() && !matches!(entry, Entry::WiggleAlone) {
+        return Err(bad_input!("name the target with --target X,Y,Z"));
+    }
     let mut folder = RunFolder::create(out, name)?;
     let service = address.service.as_ref().map(|s| &s.config.domain);
     match (&filmed.frames, service) {
@@ -300,13 +341,17 @@ fn on_camera(
         watch_operator(session, arm, &address)?;
         let rig = find_rig(session, (address.simulated, address.command))?;
         let mut scene = match (&rig, filmed.calibration) {
+            (Some(rig), Some(camera)) if filmed.names_calibration => Scene {
+                camera,
+                ..Scene::of_rig(session, rig)?
+            },
             (Some(rig), _) => Scene::of_rig(session, rig)?,
             (None, Some(camera)) => Scene {
                 camera,
                 tip_rgb: None,
                 target_rgb: None,
             },
-            (None, None) => return Err(anyhow!("{}", uncalibrated())),
+            (None, None) => bail!("the simulated rig that filmed is gone"),
         };
         let [tip_rgb, target_rgb] = filmed.colours;
         scene.tip_rgb = tip_rgb.or(scene.tip_rgb);

@@ -1,7 +1,7 @@
 //! What a run makes of the film of the wiggle: the rope, a plan for it, and a move
 //! that brings it to rest.
 
-use super::stages::{Run, Setup};
+use super::stages::{Run, SETTLED_WITHIN_S, Setup};
 use crate::command::known_rope::KnownRope;
 use crate::command::network::warning_of_pole;
 use crate::command::plan::describe;
@@ -238,7 +238,7 @@ impl Run<'_> {
                 "planning a swing-damping move takes too long on this machine; stop other programs"
             )
         })?;
-        self.wait_settled(&stage)?;
+        self.wait_still(&stage, SETTLED_WITHIN_S)?;
         self.record.settle = Some(settled);
         self.record.stages.settle_s = stage.done(&format!(
             "swing {:.1} cm -> {:.1} cm",

@@ -33,10 +33,10 @@ const WIGGLE_FRAMES: u32 = 400;
 const THROW_FRAMES: u32 = 150;
 /// Time after the last setpoint that still belongs to the throw (ns).
 const AFTER_THROW_NS: u64 = 600_000_000;
-/// Longest wait for the rope to hang still (s); where nothing else damps its swing, which then
-/// decays by itself.
-const STILL_S: f64 = 3.0;
-const STILL_UNDAMPED_S: f64 = 30.0;
+/// Longest wait for the rope to hang still after a move that was planned to bring it to rest (s).
+pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
+/// The same after any other move, where the swing of whatever was before decays by itself (s).
+const DECAYED_WITHIN_S: f64 = 45.0;
 /// How often the camera is asked for frames before the arm is enabled.
 const LOOKS: usize = 4;
 
@@ -216,12 +216,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The same after a move that damped nothing or was planned to.
-    pub(super) fn wait_settled(&mut self, stage: &Stage) -> anyhow::Result<bool> {
-        let undamped = self.setup.asks;
-        self.wait_still(stage, if undamped { STILL_UNDAMPED_S } else { STILL_S })
-    }
-
     /// Arms for a wiggle or a throw, which the operator confirms where somebody must.
     pub(super) fn arm_for(&mut self, operating_mode: OperatingMode) -> anyhow::Result<()> {
         let confirmed_ns = if self.setup.asks {
@@ -250,38 +244,34 @@ impl<'a> Run<'a> {
         }
         self.record.warnings.extend(found.warnings);
         enabled?;
-        self.move_to_start(motion)?;
-        let still = self.wait_settled(&stage)?;
+        self.move_to_start(motion, &stage)?;
         let confirmation = if self.setup.address.simulated && !self.setup.asks {
             " (simulated: no confirmation needed)"
         } else {
             ""
         };
-        self.record.stages.bringup_s = stage.done(&if still {
-            format!("arm enabled{confirmation}, rope hangs still")
-        } else {
-            format!("arm enabled{confirmation}, rope still swings a little")
-        });
+        let done = format!("arm enabled{confirmation}, it stands at the start");
+        self.record.stages.bringup_s = stage.done(&done);
         Ok(())
     }
 
-    fn move_to_start(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
+    /// Moves to the start of `motion` at set-up speed, and waits for the rope.
+    fn move_to_start(&mut self, motion: &JointTrajectory, stage: &Stage) -> anyhow::Result<()> {
         self.session.await_hold()?;
         pipeline::arm_for(self.session, &self.arm, OperatingMode::SetUp, None)?;
         pipeline::move_to(self.session, &self.arm, motion.start(), MOVE_SPEED)?;
+        if !self.wait_still(stage, DECAYED_WITHIN_S)? {
+            self.warn(&format!(
+                "the rope still swings after {DECAYED_WITHIN_S} s, and what follows takes it to hang still"
+            ));
+        }
         Ok(())
     }
 
-    /// Turns to the throw's start at set-up speed, and waits for the rope.
+    /// Turns to the throw's start.
     fn turn(&mut self, plan: &Plan) -> anyhow::Result<()> {
         let stage = Stage::begin("settle");
-        self.move_to_start(&plan.trajectory)?;
-        let still = self.wait_settled(&stage)?;
-        if !still {
-            self.warn(
-                "the rope still swings at the throw's start, of which the plan knows nothing",
-            );
-        }
+        self.move_to_start(&plan.trajectory, &stage)?;
         self.record.stages.settle_s = stage.done("arm stands at the throw's start");
         Ok(())
     }

@@ -1,0 +1,43 @@
+//! `wag run` with an arm and a camera that it did not start: a rig in another process.
+
+use super::support::{Rig, alone, json_in, refused_in};
+use run_log::files;
+
+#[test]
+fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_there() {
+    let _turn = alone();
+    let domain = format!("run{}", std::process::id());
+    let rig = Rig::start(&format!("--rope random --seed 31 --camera {domain}"));
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let [port, joints, _, rich, _] = rig.ports();
+    let arm = format!(
+        "--arm 127.0.0.1 --command-port {port} --report-port {joints} --status-port {rich}"
+    );
+    // Nothing moves, and nothing stays, where nobody films.
+    let nobody = refused_in(here, 2, &format!("run {arm} --camera {domain}x --out none"));
+    assert!(
+        nobody.contains("no simulated rig films in domain"),
+        "{nobody}"
+    );
+    assert!(!here.join("none").exists());
+
+    let done = json_in(
+        here,
+        &format!("run strike {arm} --camera {domain} --out run"),
+    );
+    let missed_m = done["true_tip_target_distance_m"].as_f64().unwrap();
+    assert!(missed_m < 0.02, "{missed_m} m");
+    assert_eq!(done["command"], "run");
+    assert_eq!(done["bring_up"][0]["step"], "identify");
+    // The truth is compared with and never used: the rope is the film's, whoever asks again.
+    let run = here.join("run");
+    assert!(run.join(files::PLAN).exists() && run.join(files::CAMERA).exists());
+    let again = json_in(here, "identify --keypoints run --out again.toml");
+    let length_m = |value: &serde_json::Value| value["length_m"].as_f64().unwrap();
+    let (first, second) = (
+        length_m(&done["identified"]["params"]),
+        length_m(&again["rope"]),
+    );
+    assert!((first - second).abs() < 5e-3, "{first} and {second} m");
+}
