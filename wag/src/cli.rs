@@ -83,6 +83,9 @@ pub enum Command {
     Track(TrackArgs),
     /// Identify the rope parameters from a video or from keypoints.
     Identify(IdentifyArgs),
+    /// Write a rope file to begin with.
+    #[command(subcommand)]
+    Rope(RopeCommand),
     /// Plan a throw.
     #[command(subcommand)]
     Plan(PlanCommand),
@@ -256,7 +259,8 @@ pub struct ObservationArgs {
     /// Recording as `wag track` takes it.
     #[arg(long)]
     pub video: Option<PathBuf>,
-    /// Keypoints as written by `wag track`.
+    /// Keypoints as written by `wag track`; or the folder of a run whose wiggle was tracked, which
+    /// tells camera and motion itself.
     #[arg(long)]
     pub keypoints: Option<PathBuf>,
 }

@@ -54,6 +54,19 @@ mod tests {
     use nalgebra::{Matrix3, Rotation3, Vector3};
     use shared_types::{Intrinsics, Shutter};
 
+    #[test]
+    fn the_example_is_a_camera_that_films_the_arms_plane() {
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../configs/camera/example.toml"
+        );
+        let camera = load_camera(Path::new(path)).unwrap();
+        assert_eq!((camera.width_px, camera.height_px), (672, 376));
+        let ahead = Vector3::new(0.72, 0.0, 0.14);
+        let in_camera = camera.r_w_cam.transpose() * (ahead - camera.p_w_cam_m);
+        assert!((in_camera - Vector3::new(0.0, 0.0, 1.40)).norm() < 1e-9);
+    }
+
     const CONF: &str = "\
         [left_cam_vga]\nfx=350.94\nfy=350.94\ncx=332.1\ncy=190.2\nk1=-0.175\nk2=0.028\n\
         [RIGHT_CAM_VGA]\nfx=350.1\nfy=350.1\ncx=331.5\ncy=184.4\nk1=0\nk2=0\n\

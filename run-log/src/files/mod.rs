@@ -10,7 +10,7 @@ mod text;
 pub(crate) use atomic::cannot_write;
 pub use atomic::{check_writable, write_atomic, write_json};
 pub use motion::{JointsCsv, read_joints, read_pose, read_table, write_joints, write_trajectory};
-pub use rope::{read_posterior, read_rope, read_unconfirmed, write_rope_estimate};
+pub use rope::{read_posterior, read_rope, read_unconfirmed, write_new_rope, write_rope_estimate};
 pub(crate) use text::cannot_read;
 pub use text::{
     located, read_arm_response, read_cell, read_excitation, read_json, read_plan, read_text,

@@ -4,7 +4,9 @@
 use super::atomic::write_atomic;
 use super::text::{located, read_text, read_toml};
 use anyhow::{Context, Result};
-use shared_types::rope::{RANGES, RopeEstimate, RopeParams, RopePosterior};
+use shared_types::rope::{
+    ParameterRange, RANGES, ROPE_PARAMETERS, RopeEstimate, RopeParams, RopePosterior,
+};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -110,6 +112,38 @@ pub fn write_rope_estimate(
     write_atomic(path, text.as_bytes())
 }
 
+/// Writes a rope that nobody has identified: every key with its unit and the range of the known
+/// ropes, and whether its value was `measured` or is a guess.
+pub fn write_new_rope(
+    path: &Path,
+    rope: &RopeParams,
+    measured: [bool; ROPE_PARAMETERS],
+) -> Result<()> {
+    let mut text = "# A rope as `wag sim`, `wag plan` and `wag rig --rope` take it; SI units, radians. `wag identify`\n\
+                    # finds these values from a filmed wiggle, and how well they are known.\n"
+        .to_owned();
+    for ((range, value), measured) in RANGES.iter().zip(rope.to_array()).zip(measured) {
+        let ParameterRange {
+            key,
+            label,
+            unit,
+            min,
+            max,
+        } = range;
+        let unit = if unit.is_empty() {
+            String::new()
+        } else {
+            format!(" ({unit})")
+        };
+        let from = if measured { "measured" } else { "a guess" };
+        writeln!(
+            text,
+            "\n# {label}{unit}, {from}; known ropes have {min} to {max}\n{key} = {value}"
+        )?;
+    }
+    write_atomic(path, text.as_bytes())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,6 +190,27 @@ mod tests {
             },
             warnings: vec!["the clocks are apart".to_owned()],
         }
+    }
+
+    #[test]
+    fn a_new_rope_says_of_each_value_whether_it_was_measured() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("rope.toml");
+        let measured = std::array::from_fn(|i| i == 1);
+        write_new_rope(&path, &estimate().params, measured).unwrap();
+        let text = read_text(&path).unwrap();
+        assert!(text.contains("# length (m), measured; known ropes have 0.45 to 0.65\nlength_m"));
+        assert_eq!(text.matches("a guess").count(), 8, "{text}");
+        let nine = RopeParams::from_array(estimate().params.to_array());
+        assert_eq!(read_rope(&path).unwrap(), nine);
+        assert_eq!(read_posterior(&path).unwrap(), None);
+    }
+
+    #[test]
+    fn the_example_is_a_rope_of_the_ranges() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/rope/example.toml");
+        let rope = read_rope(Path::new(path)).unwrap();
+        assert_eq!(rope.outside_ranges().count(), 0);
     }
 
     #[test]

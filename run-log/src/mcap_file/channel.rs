@@ -78,3 +78,41 @@ impl Channel {
         Self::ALL[self as usize].1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+
+    /// All texts of a value that look like a topic.
+    fn topics(value: &Value, found: &mut Vec<String>) {
+        let mut text = |text: &str| {
+            if let Some(named) = text.strip_prefix('/') {
+                let topic = named.split('.').next().unwrap_or_default();
+                found.push(format!("/{topic}"));
+            }
+        };
+        match value {
+            Value::String(s) => text(s),
+            Value::Array(values) => values.iter().for_each(|v| topics(v, found)),
+            Value::Object(map) => {
+                map.keys().for_each(|key| text(key));
+                map.values().for_each(|v| topics(v, found));
+            }
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn the_layout_for_foxglove_shows_topics_that_a_run_has() {
+        let layout = include_str!("../../../configs/foxglove/wag.json");
+        let layout: Value = serde_json::from_str(layout).unwrap();
+        let mut shown = Vec::new();
+        topics(&layout, &mut shown);
+        assert!(shown.len() > 10, "{shown:?}");
+        for topic in shown {
+            let mut known = Channel::ALL.iter().map(|(_, known, _)| *known);
+            assert!(known.any(|known| known == topic), "{topic}");
+        }
+    }
+}

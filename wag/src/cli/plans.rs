@@ -1,8 +1,8 @@
-//! Arguments of `wag plan` and `wag check`.
+//! Arguments of `wag plan`, `wag check` and `wag rope`.
 
 use super::Point;
-use super::values::one_of;
-use clap::Args;
+use super::values::{mass_kg, one_of};
+use clap::{Args, Subcommand};
 use cli_output::seed;
 use shared_types::CommandInterface;
 use std::path::PathBuf;
@@ -106,4 +106,32 @@ pub struct CheckArgs {
         value_name = "SIDES"
     )]
     pub fence: Option<Vec<f64>>,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum RopeCommand {
+    /// Write a rope file from what can be measured; the rest are guesses.
+    New(NewRopeArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct NewRopeArgs {
+    /// Length by tape, clamp to the lead's centre (m).
+    #[arg(long, value_name = "M")]
+    pub length: Option<f64>,
+    /// Mass of the rope without its lead, by scale (kg).
+    #[arg(long, value_name = "KG", value_parser = mass_kg)]
+    pub rope_mass: Option<f64>,
+    /// Mass of the lead, by scale (kg).
+    #[arg(long, value_name = "KG", value_parser = mass_kg)]
+    pub lead_mass: Option<f64>,
+    /// Radius of the rope (m).
+    #[arg(long, value_name = "M")]
+    pub radius: Option<f64>,
+    /// Radius of the lead (m).
+    #[arg(long, value_name = "M")]
+    pub lead_radius: Option<f64>,
+    /// The rope (TOML).
+    #[arg(long)]
+    pub out: PathBuf,
 }

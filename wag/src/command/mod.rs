@@ -25,6 +25,7 @@ mod plan_again;
 mod process;
 mod record;
 mod rig;
+mod rope;
 mod run;
 mod runs;
 mod score;
@@ -36,7 +37,7 @@ mod watch;
 mod wiggle;
 mod wiggle_design;
 
-use crate::cli::{BenchName, CalibCommand, Cli, Command, PlanCommand, SimCommand};
+use crate::cli::{BenchName, CalibCommand, Cli, Command, PlanCommand, RopeCommand, SimCommand};
 use cli_output::{OrInput, Outcome};
 use serde_json::Value;
 use shared_types::Task;
@@ -57,6 +58,7 @@ fn results(command: &Command) -> Vec<&Path> {
             PlanCommand::Strike(args) | PlanCommand::Lob(args) | PlanCommand::Drape(args),
         ) => &[Some(&args.out), args.csv.as_deref(), args.reach.as_deref()],
         Command::Plan(PlanCommand::Again(args)) => &[Some(&args.out)],
+        Command::Rope(RopeCommand::New(args)) => &[Some(&args.out)],
         Command::Latency(args) => &[args.response.as_deref()],
         Command::Report { out, .. } => &[out.as_deref()],
         Command::Ledger(args) => &[args.csv.as_deref()],
@@ -84,6 +86,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Plan(PlanCommand::Lob(args)) => plan::run(Task::Lob, args),
         Command::Plan(PlanCommand::Drape(args)) => plan::run(Task::Drape, args),
         Command::Plan(PlanCommand::Again(args)) => plan_again::run(args),
+        Command::Rope(RopeCommand::New(args)) => rope::new(args),
         Command::Check(args) => check::run(args),
         Command::Throw(args) => throw::run(args),
         Command::Latency(args) => latency::run(args),

@@ -36,7 +36,7 @@ const AFTER_THROW_NS: u64 = 600_000_000;
 /// Longest wait for the rope to hang still after a move that was planned to bring it to rest (s).
 pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 /// The same after any other move, where the swing of whatever was before decays by itself (s).
-const DECAYED_WITHIN_S: f64 = 45.0;
+const DECAYED_WITHIN_S: f64 = 180.0;
 /// How often the camera is asked for frames before the arm is enabled.
 const LOOKS: usize = 4;
 
