@@ -80,7 +80,7 @@ impl Run {
     pub fn open(run: &Path) -> Result<Self> {
         ensure!(
             run.exists(),
-            "`{}` does not exist; name a run folder as made by wag demo, throw, wiggle or record",
+            "`{}` does not exist; name a run folder as made by wag run, demo, throw, wiggle or record",
             run.display()
         );
         if run.is_dir() {

@@ -129,6 +129,10 @@ pub struct RunRecord {
     pub latency: Option<LatencyReport>,
     /// What the real-time set-up could not get, and what is poor about the plan.
     pub warnings: Vec<String>,
+    /// Colours by which the camera measured, or should have measured, the throw.
+    pub tip_rgb: Option<[u8; 3]>,
+    /// That of the target.
+    pub target_rgb: Option<[u8; 3]>,
     /// Who operated the arm, where somebody had to.
     pub operator: Option<String>,
     /// The words by which motions were confirmed, and when.

@@ -15,7 +15,6 @@ extern crate cli_output;
 mod cli;
 mod command;
 mod config;
-mod doctor;
 mod pipeline;
 
 use clap::Parser;

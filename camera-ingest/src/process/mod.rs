@@ -165,7 +165,9 @@ impl Process {
         let done = match &mut job.waiting {
             Waiting::Still { detector, until } => {
                 let still = detector.push(frame.left());
-                (still || Instant::now() >= *until).then_some(CameraEvent::Still { still })
+                // Both images lie side by side.
+                let size_px = [header.width_px / 2, header.height_px];
+                (still || Instant::now() >= *until).then_some(CameraEvent::Still { still, size_px })
             }
             Waiting::Record => {
                 if self.recording.is_empty() {

@@ -105,6 +105,8 @@ pub enum CameraEvent {
     Still {
         /// Whether it is still.
         still: bool,
+        /// Width and height of one image (px).
+        size_px: [u32; 2],
     },
     /// The first frame is kept.
     Recording {

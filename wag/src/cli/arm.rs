@@ -84,16 +84,16 @@ impl ArmArgs {
 #[derive(Debug, Args)]
 pub struct WiggleArgs {
     /// Report how well it identifies ropes of the ranges, compared with the paper's wiggle.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "camera")]
     pub evaluate: bool,
     /// Search for the most informative wiggle within the limits and report how well it does.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "camera")]
     pub optimise: bool,
     /// Seed of the ropes a wiggle is judged by.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Write the wiggle as CSV with columns t,q1..q7 (s, rad) at 250 Hz.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "camera")]
     pub csv: Option<PathBuf>,
     #[command(flatten)]
     pub camera: CameraArgs,

@@ -6,6 +6,19 @@ use camera_ingest::calib::VideoMode;
 use clap::{ArgGroup, Args, Subcommand};
 use std::path::PathBuf;
 
+/// What films.
+#[derive(Debug, Args)]
+pub struct CameraArgs {
+    /// Who films: the shared-memory domain of a camera that runs (`wag rig --camera DOMAIN`,
+    /// `wag process camera`), or a device of this machine, /dev/videoN.
+    #[arg(long, value_name = "DOMAIN|DEVICE")]
+    pub camera: Option<String>,
+    /// Calibration and extrinsics of that camera (camera.toml). Default: camera.toml in the folder
+    /// of configurations (~/.config/wag); a simulated rig tells its own.
+    #[arg(long, value_name = "FILE", requires = "camera")]
+    pub calibration: Option<PathBuf>,
+}
+
 #[derive(Debug, Args)]
 pub struct FilmArgs {
     /// The camera, /dev/videoN.

@@ -1,33 +1,17 @@
 //! Arguments of what goes from wiggle to throw: run, demo.
 
 use super::values::{Colour, mass_kg, one_of};
-use super::{ArmArgs, Point};
+use super::{ArmArgs, CameraArgs, Point};
 use clap::{ArgGroup, Args};
 use cli_output::seed;
 use shared_types::Task;
 use std::path::PathBuf;
 
-/// What films.
-#[derive(Debug, Args)]
-pub struct CameraArgs {
-    /// Who films: the shared-memory domain of a camera that runs (`wag rig --camera DOMAIN`,
-    /// `wag process camera`), or a device of this machine, /dev/videoN.
-    #[arg(long, value_name = "DOMAIN|DEVICE")]
-    pub camera: Option<String>,
-    /// Calibration and extrinsics of that camera (camera.toml). Default: camera.toml in the folder
-    /// of configurations (~/.config/wag); a simulated rig tells its own.
-    #[arg(long, value_name = "FILE", requires = "camera")]
-    pub calibration: Option<PathBuf>,
-    /// Frames per second of a device.
-    #[arg(long, default_value_t = 60, requires = "camera")]
-    pub fps: u32,
-}
-
 #[derive(Debug, Args)]
 #[command(
     group(ArgGroup::new("entry").args(["from", "again"])),
     after_help = "EXAMPLES:\n  \
-        wag run strike --arm 192.168.1.200 --camera /dev/video0 --target 0.9,0,0.3\n  \
+        wag run strike --arm 192.168.1.200 --camera /dev/video0 --target 0.9,0,0.3 --target-rgb 38,168,74\n  \
         wag run --from plan runs/RUN --arm 192.168.1.200 --camera /dev/video0\n  \
         wag run --again runs/RUN --arm 192.168.1.200 --camera /dev/video0\n\n\
         Rehearsal: `wag rig --rope random --camera lab` in another terminal, then\n  \
@@ -43,12 +27,12 @@ pub struct RunArgs {
     pub task: Task,
     #[command(flatten)]
     pub camera: CameraArgs,
-    /// Target x,y,z in the arm's base frame (m). Default: that of the run gone on with; in front of
+    /// Target x,y,z in the arm's base frame (m). Default: that of the run resumed; in front of
     /// a simulated rig's camera, one drawn from the seed, where the rig puts its ball.
     #[arg(long, allow_hyphen_values = true)]
     pub target: Option<Point>,
-    /// Go on with an earlier run, from one of these stages: identify (its keypoints), plan (its
-    /// rope), throw (its plan).
+    /// Resume an earlier run at one of these stages: identify (with its keypoints), plan (with its
+    /// rope), throw (with its plan).
     #[arg(
         long,
         num_args = 2,
@@ -56,7 +40,9 @@ pub struct RunArgs {
     )]
     pub from: Vec<String>,
     /// Throw the strike of this run again, changed so that its miss is taken out.
-    #[arg(long, value_name = "RUN", conflicts_with_all = ["target", "lead_mass", "length", "robust"])]
+    #[arg(long, value_name = "RUN", conflicts_with_all = [
+        "target", "lead_mass", "length", "robust", "dry_run",
+    ])]
     pub again: Option<PathBuf>,
     /// Colour of the target, R,G,B from 0 to 255: by it the film of the throw tells how much it
     /// missed.
@@ -87,7 +73,7 @@ pub struct RunArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Where an earlier run is gone on with.
+/// Where an earlier run is resumed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FromStage {
     Identify,
@@ -96,7 +82,7 @@ pub enum FromStage {
 }
 
 impl RunArgs {
-    /// Which run is gone on with, and from where; `Err` says what is known instead.
+    /// Which run is resumed, and where; `Err` says what is known instead.
     pub fn from(&self) -> Result<Option<(FromStage, PathBuf)>, String> {
         let [stage, run] = self.from.as_slice() else {
             return Ok(None);
@@ -107,7 +93,7 @@ impl RunArgs {
             "throw" => FromStage::Throw,
             other => {
                 return Err(format!(
-                    "--from {other}: the stages that can be gone on from are identify, plan and throw"
+                    "--from {other}: a run can be resumed at identify, plan or throw"
                 ));
             }
         };
@@ -143,7 +129,7 @@ pub struct DemoArgs {
     /// Throw at the target of this demo again, with its rope, corrected by the miss that its
     /// camera measured; again for a third throw, with the run of the second.
     #[arg(long, value_name = "RUN", conflicts_with_all = [
-        "task", "seed", "target", "rig_config", "accept_unconfirmed",
+        "task", "seed", "target", "rig_config",
     ])]
     pub again: Option<PathBuf>,
 }

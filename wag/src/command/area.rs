@@ -1,6 +1,7 @@
 //! What a motion of an arm stands on before it is brought up: which arm answers, how it follows,
 //! who operates it, and that somebody says that the area is clear.
 
+use super::dry_run::interface_to;
 use crate::cli::ArmArgs;
 use crate::config;
 use crate::pipeline::{ArmAddress, Service};
@@ -10,6 +11,7 @@ use cli_output::{OrInput, Outcome, output};
 use rt_controller::config::measured_lags;
 use rt_controller::session::ArmSession;
 use run_log::files;
+use shared_types::CommandInterface;
 use std::io::{BufRead, IsTerminal, Write, stdin, stdout};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -125,6 +127,14 @@ pub fn reach_measured(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
         arm_response,
         ..address
     }))
+}
+
+/// How an arm follows, for plans that compensate for it: it was measured by positions and tells
+/// nothing of an arm that is sent velocities.
+pub fn response_for_plans(address: &ArmAddress) -> Outcome<Option<ArmResponse>> {
+    let by_position = interface_to(Some(address))? == CommandInterface::ServoPosition;
+    let measured = address.arm_response.as_ref().filter(|_| by_position);
+    Ok(measured.map(|(_, response)| response.clone()))
 }
 
 /// How an arm follows, from a file that the controller can use.

@@ -1,10 +1,10 @@
 //! `wag demo`: one throw from start to end on a simulated rig that is started for it.
 
-use super::plan_again::LastThrow;
+use super::plan_again::{LastThrow, check_thrown};
 use super::run::{Entry, Run, Setup, check_target, in_folder, random_target};
 use crate::cli::DemoArgs;
 use crate::config;
-use crate::pipeline::{self, FramesFrom, RunFolder, Scene};
+use crate::pipeline::{self, FramesFrom, RunFolder};
 use arm_model::Limits;
 use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use planner::PlannerConfig;
@@ -43,6 +43,7 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
         .map_or(Ok(()), RunFolder::refuse_existing)?;
     let entry = match last {
         Some(last) => {
+            check_thrown(&last.plan, args.accept_unconfirmed)?;
             let plan = last.to_throw((limits.clone(), settings.clone()), None)?;
             Entry::Plan(Box::new(plan))
         }
@@ -55,14 +56,18 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
         let stage = Stage::begin("start");
         // First, because the arm's ports are found there.
         let (rig, address) = pipeline::start_rig(session, &folder, &rig_config)?;
+        let colours = rig_config.appearance();
+        record.tip_rgb = Some(colours.lead_rgb);
+        record.target_rgb = Some(colours.target_rgb);
         let setup = Setup {
             settings,
             limits,
             address,
             asks: false,
+            held: false,
             acknowledges: false,
             frames: FramesFrom::Domain(folder.domain.clone()),
-            scene: Scene::of_rig(session, &rig)?,
+            camera: rig_config.camera.stereo_camera(),
             rig: Some(rig),
             accept_unconfirmed: args.accept_unconfirmed,
             robust: 0,

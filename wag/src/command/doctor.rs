@@ -3,9 +3,9 @@
 use super::network::network;
 use crate::cli::ArmPorts;
 use crate::config;
-use crate::doctor::{Finding, Machine, Verdict, inputs, judge_line, settings};
 use arm_model::{JOINTS, Limits};
 use cli_output::{OrInput, Outcome, output, table};
+use doctor::{Finding, Machine, Verdict, inputs, judge_line, settings};
 use rt_controller::ControllerConfig;
 use run_log::files;
 use serde_json::{Value, json};

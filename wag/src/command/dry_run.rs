@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use shared_types::CommandInterface;
 
 /// The command interface by which a motion would reach the arm.
-fn interface_to(address: Option<&ArmAddress>) -> Outcome<CommandInterface> {
+pub fn interface_to(address: Option<&ArmAddress>) -> Outcome<CommandInterface> {
     match address.and_then(|address| address.service.as_ref()) {
         Some(service) => Ok(service.config.command_interface),
         None => {

@@ -37,12 +37,19 @@ struct Observed {
 
 impl Observed {
     /// What a run keeps of its tracked wiggle.
-    fn of_run(folder: &Path, method: Method, accepted: bool) -> Outcome<Self> {
+    fn of_run(
+        folder: &Path,
+        camera: Option<&Path>,
+        (method, accepted): (Method, bool),
+    ) -> Outcome<Self> {
         let run = Run::open(folder).or_input()?;
-        let camera = load_camera(&folder.join(files::CAMERA)).or_input()?;
+        let kept = run.folder().join(files::CAMERA);
+        let camera = load_camera(camera.unwrap_or(&kept)).or_input()?;
         let film = run.tracked_film().or_input()?;
         let pole = config::cell_of(&run).or_input()?.pole;
         let clamp = ClampMotion::new(folder, Some(film.joints), pole, 0.0);
+        let film_s = film.track.frames.last().map_or(0.0, |frame| frame.t_s);
+        clamp.check_covers(film_s).or_input()?;
         let look = format!("look at `{}`", folder.join("wiggle.png").display());
         let mut unconfirmed = film.track.unconfirmed.clone();
         let summary = run.summary().or_input()?.unwrap_or_default();
@@ -66,6 +73,13 @@ impl Observed {
             motion: clamp.attach().or_input()?,
             warnings: other_pole(&clamp, method).into_iter().collect(),
         })
+    }
+
+    /// Tells a person what is poor about it.
+    fn warn(&self) {
+        for warning in &self.warnings {
+            eprintln!("warning: {warning}");
+        }
     }
 
     /// The rope behind it.
@@ -102,7 +116,16 @@ fn read_keypoints(path: &Path) -> anyhow::Result<KeypointTrack> {
 fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     if let Some(path) = &args.observation.keypoints {
         if path.is_dir() {
-            return Observed::of_run(path, method, args.accept_unconfirmed);
+            if args.scene.motion.is_given() || args.scene.film_late_ms != 0.0 {
+                return Err(bad_input!(
+                    "`{}` is a run, which tells its motion itself: leave out --joints, --pose and --film-late-ms",
+                    path.display()
+                ));
+            }
+            let camera = args.scene.camera.as_deref();
+            let observed = Observed::of_run(path, camera, (method, args.accept_unconfirmed))?;
+            observed.warn();
+            return Ok(observed);
         }
         let camera = args.scene.camera().or_input()?;
         let clamp = named_motion(&args.scene).or_input()?;
@@ -111,17 +134,15 @@ fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
         let film_s = track.frames.last().map_or(0.0, |frame| frame.t_s);
         clamp.check_covers(film_s).or_input()?;
         confirm(&track.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
-        let warnings: Vec<_> = other_pole(&clamp, method).into_iter().collect();
-        for warning in &warnings {
-            eprintln!("warning: {warning}");
-        }
-        return Ok(Observed {
+        let observed = Observed {
             track,
             appearance: Appearance::default(),
             camera,
             motion,
-            warnings,
-        });
+            warnings: other_pole(&clamp, method).into_iter().collect(),
+        };
+        observed.warn();
+        return Ok(observed);
     }
     let Some(video) = &args.observation.video else {
         return Err(bad_input!(
@@ -239,11 +260,11 @@ pub fn again(
 ) -> Outcome<(RopeEstimate, Vec<String>)> {
     let method = options.method;
     let net = method.asks_network().then(|| network(None)).transpose()?;
-    let observed = Observed::of_run(run, method, accept_unconfirmed)?;
+    let observed = Observed::of_run(run, None, (method, accept_unconfirmed))?;
+    observed.warn();
     let stage = Stage::begin("identify");
     let estimate = observed.estimate(options, net.as_ref(), &stage)?;
     stage.done(&format!("residual {:.2} px", estimate.residual_px));
-    print_remarks(&estimate);
     Ok((estimate, observed.track.unconfirmed))
 }
 

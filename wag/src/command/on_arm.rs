@@ -87,6 +87,39 @@ pub fn on_arm(
     Ok((folder.path.clone(), value))
 }
 
+/// Takes the operator's place at the controller of `address` and enables its arm; what was `found`
+/// on the way, also when it is refused.
+pub fn enable(
+    session: &mut Session,
+    link: &ArmLink,
+    (address, acknowledges): (&ArmAddress, bool),
+    found: &mut BringUp,
+) -> anyhow::Result<()> {
+    session.take_operator()?;
+    if let Some(service) = &address.service {
+        // What was asked, checked and confirmed was so for that configuration.
+        service.require_unchanged(session, link)?;
+    }
+    pipeline::enable(session, link, acknowledges, found)?;
+    for warning in &found.warnings {
+        tracing::warn!("{warning}");
+    }
+    Ok(())
+}
+
+/// Moves at set-up speed, as fast as a part of the arm's fastest move.
+pub fn set_up_move(
+    session: &mut Session,
+    link: &ArmLink,
+    pose: JointVector,
+    speed_fraction: f64,
+) -> anyhow::Result<()> {
+    session.await_hold()?;
+    pipeline::arm_for(session, link, OperatingMode::SetUp, None)?;
+    pipeline::move_to(session, link, pose, speed_fraction)?;
+    Ok(())
+}
+
 /// Watches the operator at standard input, as the arm and the command line want it.
 pub fn watch_operator(
     session: &mut Session,
@@ -137,20 +170,10 @@ fn bring_up(
     let stage = Stage::begin("bring-up");
     pipeline::start_recorder(session, folder, limits, None, None)?;
     let link = pipeline::controller(session, folder, limits, address)?;
-    session.take_operator()?;
-    if let Some(service) = &address.service {
-        // What was asked, checked and confirmed was so for that configuration.
-        service.require_unchanged(session, &link)?;
-    }
-    pipeline::enable(session, &link, acknowledges, found)?;
-    for warning in &found.warnings {
-        tracing::warn!("{warning}");
-    }
+    enable(session, &link, (address, acknowledges), found)?;
     stage.done("arm enabled");
-    session.await_hold()?;
     let stage = Stage::begin("start pose");
-    pipeline::arm_for(session, &link, OperatingMode::SetUp, None)?;
-    pipeline::move_to(session, &link, start, MOVE_SPEED)?;
+    set_up_move(session, &link, start, MOVE_SPEED)?;
     stage.done("arm stands at the start");
     Ok(link)
 }

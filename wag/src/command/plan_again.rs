@@ -1,6 +1,7 @@
 //! `wag plan again`: the last strike, corrected by its miss.
 
-use super::plan::{check_fault, classify, describe, read, tell};
+use super::plan::{LOOK, check_fault, classify, describe, read, tell};
+use super::unconfirmed::confirm;
 use crate::cli::{AgainArgs, Point};
 use crate::config;
 use anyhow::anyhow;
@@ -13,6 +14,13 @@ use run_log::{Run, files};
 use serde_json::{Value, json};
 use shared_types::Plan;
 use std::path::Path;
+
+/// Refuses to throw a plan whose track is unconfirmed, or that was made for another cell.
+pub fn check_thrown(plan: &Plan, accept_unconfirmed: bool) -> Outcome {
+    confirm(&plan.unconfirmed, accept_unconfirmed, LOOK).or_failed()?;
+    config::cell_for(plan).or_input()?;
+    Ok(())
+}
 
 /// A throw that was made, and where its tip passed.
 pub struct LastThrow {

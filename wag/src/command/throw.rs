@@ -1,12 +1,10 @@
 //! `wag throw`: execute a plan on an arm, once, open loop, with latencies.
 
-use super::area::{asks, limits, reach_measured, require_clear_area};
+use super::area::{asks, limits, reach_measured, require_clear_area, response_for_plans};
 use super::dry_run;
 use super::motion;
 use super::on_arm::{AT_START, on_arm};
-use super::plan::LOOK;
-use super::plan_again::LastThrow;
-use super::unconfirmed::confirm;
+use super::plan_again::{LastThrow, check_thrown};
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
 use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
@@ -84,10 +82,8 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
     let last = last
         .map(|run| LastThrow::read(run, args.miss))
         .transpose()?;
-    let throws = named.iter().chain(last.as_ref().map(|last| &last.plan));
-    for plan in throws {
-        confirm(&plan.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
-        config::cell_for(plan).or_input()?;
+    for plan in named.iter().chain(last.as_ref().map(|last| &last.plan)) {
+        check_thrown(plan, args.accept_unconfirmed)?;
     }
     args.out
         .as_deref()
@@ -124,10 +120,7 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
 /// throw was.
 fn response(arm: &ArmArgs, address: Option<&ArmAddress>) -> Outcome<Option<ArmResponse>> {
     match address {
-        Some(address) => Ok(address
-            .arm_response
-            .as_ref()
-            .map(|(_, response)| response.clone())),
+        Some(address) => response_for_plans(address),
         None => {
             let mut places = config::arm_response_files().or_input()?;
             let here = places.find(|file| file.exists());

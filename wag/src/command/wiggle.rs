@@ -21,7 +21,7 @@ pub fn run(args: &WiggleArgs) -> Outcome<Option<Value>> {
             "choose what to do with the wiggle: --csv FILE writes it, --arm ADDR or --controller NAME executes it, --evaluate reports its information"
         ));
     }
-    if args.camera.camera.is_some() && args.arm.names_arm() {
+    if args.camera.camera.is_some() && !args.arm.dry_run {
         return wiggle_alone(args);
     }
     let address = reach_measured(&args.arm)?;

@@ -3,7 +3,7 @@
 
 use super::{RunFolder, start};
 use crate::config;
-use anyhow::{Context, anyhow, bail, ensure};
+use anyhow::{Context, anyhow, bail};
 use camera_ingest::calib::{VideoMode, load_camera, write_camera_toml, write_factory_conf};
 use camera_ingest::live::{CameraConfig, LiveSettings};
 use camera_ingest::process::CameraConfig as IngestConfig;
@@ -14,22 +14,27 @@ use shared_types::ipc::message::{CameraRequest, CameraRpc, RigEvent, RigRequest,
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, DomainSweep, IpcError};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Longest wait for a simulated rig.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(5);
+/// Frames per second, for which the lengths of the films are made.
+const RATE_HZ: u32 = 60;
 
 /// Where frames come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FramesFrom {
     /// Somebody publishes them in this shared-memory domain.
     Domain(String),
-    /// A device of this machine, filmed at this rate (Hz).
-    Device(PathBuf, u32),
+    /// A device of this machine.
+    Device(PathBuf),
 }
 
-/// The camera, and the colours by which it measures a throw.
+/// The camera, and the colours of tip and target where a simulated rig tells them.
 #[derive(Debug, Clone)]
 pub struct Scene {
     pub camera: StereoCamera,
-    pub tip_rgb: Option<[u8; 3]>,
-    pub target_rgb: Option<[u8; 3]>,
+    pub colours: Option<[[u8; 3]; 2]>,
 }
 
 impl Scene {
@@ -48,27 +53,27 @@ impl Scene {
                 target_rgb,
             } => Ok(Self {
                 camera: *camera,
-                tip_rgb: Some(tip_rgb),
-                target_rgb: Some(target_rgb),
+                colours: Some([tip_rgb, target_rgb]),
             }),
             other => bail!("the rig answered with {other:?}"),
         }
     }
+}
 
-    fn mode(&self) -> anyhow::Result<VideoMode> {
-        let (width_px, height_px) = (self.camera.width_px, self.camera.height_px);
-        VideoMode::of_size_px((width_px, height_px)).with_context(|| {
-            format!("no camera of this system has images of {width_px}x{height_px} pixels")
-        })
-    }
+/// The mode whose images have the calibration's size.
+fn mode(camera: &StereoCamera) -> anyhow::Result<VideoMode> {
+    let (width_px, height_px) = (camera.width_px, camera.height_px);
+    VideoMode::of_size_px((width_px, height_px)).with_context(|| {
+        format!("no camera of this system has images of {width_px}x{height_px} pixels")
+    })
+}
 
-    /// Writes the calibration into a run's folder, as a laboratory keeps it.
-    pub fn keep(&self, folder: &RunFolder) -> anyhow::Result<()> {
-        let (conf, mode) = (Path::new("camera.conf"), self.mode()?);
-        write_factory_conf(&folder.path.join(conf), &self.camera, mode)?;
-        write_camera_toml(&folder.file(files::CAMERA), &self.camera, mode, conf)?;
-        Ok(())
-    }
+/// Writes the calibration into a run's folder, as a laboratory keeps it.
+pub fn keep_calibration(folder: &RunFolder, camera: &StereoCamera) -> anyhow::Result<()> {
+    let (conf, mode) = (Path::new("camera.conf"), mode(camera)?);
+    write_factory_conf(&folder.path.join(conf), camera, mode)?;
+    write_camera_toml(&folder.file(files::CAMERA), camera, mode, conf)?;
+    Ok(())
 }
 
 /// Starts the device, if one films, and what takes the frames in, unless that runs already.
@@ -76,16 +81,16 @@ pub fn start_camera(
     session: &mut Session,
     folder: &RunFolder,
     from: &FramesFrom,
-    scene: &Scene,
+    calibration: &StereoCamera,
 ) -> anyhow::Result<RpcClient<CameraRpc>> {
     let domain = folder.domain.clone();
-    if let FramesFrom::Device(device, rate_hz) = from {
+    if let FramesFrom::Device(device) = from {
         let config = CameraConfig {
             domain: domain.clone(),
             camera: LiveSettings {
                 device: device.clone(),
-                mode: scene.mode()?,
-                rate_hz: *rate_hz,
+                mode: mode(calibration)?,
+                rate_hz: RATE_HZ,
                 gain: None,
                 exposure_raw: None,
                 sensor_gain_raw: None,
@@ -110,39 +115,23 @@ pub fn start_camera(
     }
 }
 
-/// Whether a simulated rig runs in a shared-memory domain.
+/// The command port of the simulated rig that runs in a shared-memory domain, if one does.
 ///
 /// # Errors
 /// The name is none, or shared memory cannot be used.
-pub fn has_rig(domain: &str) -> anyhow::Result<bool> {
+pub fn port_of_rig(domain: &str) -> anyhow::Result<Option<u16>> {
     // Removed last: it looks for others in the domain.
     let _sweep = DomainSweep::new(domain);
     let bus = Bus::join(domain)?;
-    match RpcClient::<RigRpc>::open(&bus)?.call(&RigRequest::Ports) {
-        Ok(_) => Ok(true),
-        Err(IpcError::Gone { .. }) => Ok(false),
-        Err(error) => Err(error.into()),
-    }
-}
-
-/// The simulated rig whose camera publishes in the session's domain, if it is one's. Its arm must
-/// be the one that moves, at `command_port`.
-pub fn find_rig(
-    session: &mut Session,
-    (simulated, command_port): (bool, u16),
-) -> anyhow::Result<Option<RpcClient<RigRpc>>> {
-    let Some(rig) = session.find::<RigRpc>(&RigRequest::Ports)? else {
-        return Ok(None);
+    let asked = match RpcClient::<RigRpc>::open(&bus)?.call(&RigRequest::Ports) {
+        Ok(asked) => asked,
+        Err(IpcError::Gone { .. }) => return Ok(None),
+        Err(error) => return Err(error.into()),
     };
-    ensure!(
-        simulated,
-        "the camera is a simulated rig's, but the arm does not prove that it is simulated: name the camera that films this arm"
-    );
-    match session.ask(&rig, &RigRequest::Ports, 5.0, |_| ())? {
-        RigEvent::Ports { command, .. } if command == command_port => Ok(Some(rig)),
-        RigEvent::Ports { command, .. } => Err(anyhow!(
-            "the camera films the simulated arm with command port {command}, not the one with port {command_port}: name that port with --command-port, or the camera of the other"
+    match asked.finish::<anyhow::Error>(ANSWERED_WITHIN, || Ok(()), |_| ())? {
+        RigEvent::Ports { command, .. } => Ok(Some(command)),
+        other => Err(anyhow!(
+            "the rig of domain `{domain}` answered with {other:?}"
         )),
-        other => Err(anyhow!("the rig answered with {other:?}")),
     }
 }

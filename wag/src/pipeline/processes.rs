@@ -10,7 +10,7 @@ use rt_controller::arm_settings::ArmSettings;
 use rt_controller::config::OnDifference;
 use run_log::RecorderConfig;
 use session::{ProcessSpec, Session};
-use shared_types::ipc::message::{ControllerRequest, RigEvent, RigRequest, RigRpc};
+use shared_types::ipc::message::{ControllerRequest, ControllerRpc, RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::{Rpc, RpcClient};
 use shared_types::{CommandInterface, StereoCamera};
 use std::net::{IpAddr, Ipv4Addr};
@@ -136,6 +136,15 @@ pub fn controller(
     if let Some(service) = &arm.service {
         folder.config("rt-controller", &service.config)?;
         return session.connect(&ControllerRequest::Status);
+    }
+    if session
+        .find::<ControllerRpc>(&ControllerRequest::Status)?
+        .is_some()
+    {
+        let domain = &folder.domain;
+        bail!(
+            "a controller runs in domain `{domain}` already: use it with --controller {domain} instead of --arm, or end it"
+        );
     }
     let config = folder.config("rt-controller", &controller_config(folder, limits, arm)?)?;
     for name in ["rt-controller", "guardian"] {

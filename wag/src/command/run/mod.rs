@@ -1,38 +1,35 @@
 //! `wag run`: from wiggle to throw with an arm and a camera; what `wag demo` does on a rig of its
 //! own.
 
+mod inputs;
 mod rope;
 mod stages;
 mod summary;
 
+pub use inputs::check_target;
 pub use stages::{Entry, Run, Setup};
 
-use super::area::{asks, limits, operator, reach_measured, require_clear_area};
-use super::known_rope::KnownRope;
+use super::area::{asks, limits, operator, reach_measured, require_clear_area, response_for_plans};
 use super::on_arm::{confirmations, of_service, watch_operator};
-use super::plan::LOOK;
-use super::plan_again::LastThrow;
+use super::plan_again::{LastThrow, check_thrown};
 use super::runs::explain_stop;
-use super::unconfirmed::confirm;
-use super::{dry_run, identify, motion};
-use crate::cli::{ArmArgs, CameraArgs, FromStage, RunArgs, WiggleArgs};
+use super::{dry_run, motion};
+use crate::cli::{ArmArgs, RunArgs, WiggleArgs};
 use crate::config;
-use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene, find_rig, has_rig};
-use anyhow::{Context, bail, ensure};
+use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene};
+use anyhow::{Context, ensure};
 use arm_model::{JointTrajectory, Limits};
-use cli_output::{Failure, OrInput, Outcome, Stage, watch_interrupts};
+use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
+use inputs::{Inputs, entry};
 use planner::PlannerConfig;
-use planner::plan::{check_reach, clear_of_arm};
 use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use run_log::files::{self, read_plan};
-use run_log::{Run as RecordedRun, RunRecord};
+use run_log::{RunRecord, files};
 use serde_json::Value;
 use session::Session;
-use shared_types::ipc::message::{RigEvent, RigRequest};
-use shared_types::rope::RANGES;
-use shared_types::{OperatingMode, StereoCamera, Task};
+use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
+use shared_types::{OperatingMode, Task};
 use std::path::Path;
 use std::time::Instant;
 use viewer::report;
@@ -84,73 +81,6 @@ fn keep_report(run: &Path) {
     }
 }
 
-/// Who films, and with which calibration as far as files tell.
-fn camera(args: &CameraArgs) -> Outcome<(FramesFrom, Option<StereoCamera>)> {
-    let Some(named) = &args.camera else {
-        return Err(bad_input!(
-            "name who films with --camera: the shared-memory domain of a camera that runs, or a device, /dev/videoN"
-        ));
-    };
-    let calibration = Scene::of_file(args.calibration.as_deref()).or_input()?;
-    let from = if named.starts_with('/') {
-        FramesFrom::Device(named.into(), args.fps)
-    } else {
-        FramesFrom::Domain(named.clone())
-    };
-    if calibration.is_none() && matches!(from, FramesFrom::Device(..)) {
-        return Err(uncalibrated(&from));
-    }
-    Ok((from, calibration))
-}
-
-fn uncalibrated(from: &FramesFrom) -> Failure {
-    let nobody = match from {
-        FramesFrom::Domain(domain) => {
-            format!("no simulated rig films in domain `{domain}`, and where another camera ")
-        }
-        FramesFrom::Device(..) => "where the camera ".to_owned(),
-    };
-    bad_input!(
-        "{nobody}stands is not known: name its camera.toml with --calibration, or put it into the folder of configurations (~/.config/wag); `wag calib extrinsics` estimates it"
-    )
-}
-
-/// Where the run begins, and the target of the run that it goes on with.
-fn entry(args: &RunArgs, settings: &PlannerConfig) -> Outcome<(Entry, Option<[f64; 3]>)> {
-    let Some((stage, from)) = args.from().map_err(|why| bad_input!("{why}"))? else {
-        return Ok((Entry::Wiggle, None));
-    };
-    let run = RecordedRun::open(&from).or_input()?;
-    let planned = run.plan().or_input()?.map(|plan| plan.target_m);
-    let summary = run.summary().or_input()?.unwrap_or_default();
-    let target_m = planned.or_else(|| serde_json::from_value(summary["target_m"].clone()).ok());
-    let rope = |known: KnownRope| (Entry::Rope(Box::new(known)), target_m);
-    Ok(match stage {
-        FromStage::Identify => {
-            let accept = args.accept_unconfirmed;
-            let (estimate, unconfirmed) = identify::again(&from, &settings.identify, accept)?;
-            rope(KnownRope::identified(estimate, unconfirmed))
-        }
-        FromStage::Plan => {
-            let known = KnownRope::read(&from.join(files::ROPE)).or_input()?;
-            confirm(&known.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
-            rope(known)
-        }
-        FromStage::Throw => {
-            let plan = read_plan(&from.join(files::PLAN)).or_input()?;
-            confirm(&plan.unconfirmed, args.accept_unconfirmed, LOOK).or_failed()?;
-            config::cell_for(&plan).or_input()?;
-            (Entry::Plan(Box::new(plan)), target_m)
-        }
-    })
-}
-
-/// A target that is named must lie where a rope can strike.
-pub fn check_target(target_m: [f64; 3], settings: &PlannerConfig) -> Outcome {
-    check_reach(target_m, RANGES[1].max, &settings.cell).or_input()?;
-    clear_of_arm(target_m, &settings.cell).or_input()
-}
-
 /// The planner's values, with what the command line says of the rope.
 fn settings(args: &RunArgs) -> Outcome<PlannerConfig> {
     let mut settings = config::here::<PlannerConfig>(None)
@@ -178,69 +108,42 @@ pub fn run(args: &RunArgs) -> Outcome<Option<Value>> {
             "name the arm with --arm ADDR, or a controller that runs with --controller NAME"
         ));
     }
-    let (frames, calibration) = camera(&args.camera)?;
-    let named = args.target.map(|target| target.0);
-    named.map_or(Ok(()), |target_m| check_target(target_m, &settings))?;
-    args.out
-        .as_deref()
-        .map_or(Ok(()), RunFolder::refuse_existing)?;
-    watch_interrupts().or_failed()?;
+    let inputs = Inputs::of_run(args, &settings)?;
     let last = args.again.as_deref();
     let last = last.map(|run| LastThrow::read(run, None)).transpose()?;
-    let (entry, earlier) = match &last {
-        Some(last) => (Entry::Wiggle, Some(last.plan.target_m)),
-        None => entry(args, &settings)?,
-    };
-    let (address, limits) = reach_for_run(&args.arm)?;
+    if let Some(last) = &last {
+        check_thrown(&last.plan, args.accept_unconfirmed)?;
+    }
+    let (address, limits) = reach_filmed(&args.arm, &inputs)?;
     let entry = match last {
         Some(last) => {
-            let response = address.arm_response.as_ref().map(|(_, r)| r.clone());
             let ways = (limits.clone(), settings.clone());
-            Entry::Plan(Box::new(last.to_throw(ways, response)?))
+            let plan = last.to_throw(ways, response_for_plans(&address)?)?;
+            Entry::Plan(Box::new(plan))
         }
-        None => entry,
-    };
-    let filmed = Filmed {
-        frames,
-        calibration,
-        names_calibration: args.camera.calibration.is_some(),
-        target_m: named.or(earlier),
-        colours: [args.tip_rgb, args.target_rgb].map(|named| named.map(|colour| colour.0)),
-        accept_unconfirmed: args.accept_unconfirmed,
-        robust: args.robust,
+        None => entry(args, &settings)?,
     };
     let place = (args.out.as_deref(), "run", args.seed);
-    on_camera(&args.arm, (address, limits, settings), filmed, place, entry)
+    on_camera(&args.arm, (address, limits, settings), inputs, place, entry)
 }
 
 /// The wiggle alone, filmed and tracked: what `wag identify --keypoints RUN` and
 /// `wag run --from identify RUN` go on with.
 pub fn wiggle_alone(args: &WiggleArgs) -> Outcome<Option<Value>> {
     let settings: PlannerConfig = config::here(None).or_input()?;
-    let (frames, calibration) = camera(&args.camera)?;
-    args.out
-        .as_deref()
-        .map_or(Ok(()), RunFolder::refuse_existing)?;
-    watch_interrupts().or_failed()?;
-    let (address, limits) = reach_for_run(&args.arm)?;
-    let filmed = Filmed {
-        frames,
-        calibration,
-        names_calibration: args.camera.calibration.is_some(),
-        target_m: None,
-        colours: [None; 2],
-        accept_unconfirmed: args.accept_unconfirmed,
-        robust: 0,
-    };
+    let inputs = Inputs::of_wiggle(args)?;
+    let (address, limits) = reach_filmed(&args.arm, &inputs)?;
     let place = (args.out.as_deref(), "wiggle", args.seed);
     let with = (address, limits, settings);
-    on_camera(&args.arm, with, filmed, place, Entry::WiggleAlone)
+    on_camera(&args.arm, with, inputs, place, Entry::WiggleAlone)
 }
 
 /// Tells what would be done first, and checks it.
 fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
+    let target_m = args.target.map(|target| target.0);
+    target_m.map_or(Ok(()), |target_m| check_target(target_m, settings))?;
     let limits = limits(&args.arm, None)?;
-    let (first, _) = entry(args, settings)?;
+    let first = entry(args, settings)?;
     let Some((trajectory, operating_mode)) = first_motion(&first, &limits, settings)? else {
         println!("the throw is planned with the rope first, and checked then");
         return Ok(None);
@@ -281,85 +184,54 @@ fn check_first(
     motion::require_measured_joints(address, &trajectory, operating_mode)
 }
 
-/// The arm that is named, and its limits.
-fn reach_for_run(arm: &ArmArgs) -> Outcome<(ArmAddress, Limits)> {
+/// The arm that is named and filmed, and its limits.
+fn reach_filmed(arm: &ArmArgs, inputs: &Inputs) -> Outcome<(ArmAddress, Limits)> {
     let address = reach_measured(arm)?.ok_or_else(|| bad_input!("name the arm with --arm ADDR"))?;
+    inputs.check_arm(&address)?;
     let limits = limits(arm, Some(&address))?;
     Ok((address, limits))
-}
-
-/// What the command line says of camera, target and rope.
-struct Filmed {
-    frames: FramesFrom,
-    calibration: Option<StereoCamera>,
-    /// Whether the command line names that calibration: then it goes before a simulated rig's.
-    names_calibration: bool,
-    target_m: Option<[f64; 3]>,
-    /// Of tip and target.
-    colours: [Option<[u8; 3]>; 2],
-    accept_unconfirmed: bool,
-    robust: usize,
 }
 
 /// Goes from `entry` to its end with an arm and a camera that are there.
 fn on_camera(
     arm: &ArmArgs,
     (address, limits, settings): (ArmAddress, Limits, PlannerConfig),
-    filmed: Filmed,
+    inputs: Inputs,
     (out, name, seed): (Option<&Path>, &'static str, u64),
     entry: Entry,
 ) -> Outcome<Option<Value>> {
     check_first(&entry, &address, &limits, &settings)?;
-    require_clear_area(arm, &address, "MOVE")?;
     let operator = operator(arm, &address)?;
-    let simulated = match &filmed.frames {
-        FramesFrom::Domain(domain) => has_rig(domain).or_failed()?,
-        FramesFrom::Device(..) => false,
-    };
-    if !simulated && filmed.calibration.is_none() {
-        return Err(uncalibrated(&filmed.frames));
+    // A throw that is still to be planned asks before its first move, minutes from now.
+    if !matches!(entry, Entry::Rope(_)) || arm.yes {
+        require_clear_area(arm, &address, "MOVE")?;
     }
-    if !simulated && filmed.target_m.is_none() && !matches!(entry, Entry::WiggleAlone) {
-        return Err(bad_input!("name the target with --target X,Y,Z"));
-    }
+    watch_interrupts().or_failed()?;
     let mut folder = RunFolder::create(out, name)?;
     let service = address.service.as_ref().map(|s| &s.config.domain);
-    match (&filmed.frames, service) {
-        (FramesFrom::Domain(camera), Some(controller)) if camera != controller => {
-            return Err(bad_input!(
-                "the camera runs in shared-memory domain `{camera}`, the controller in `{controller}`: start both in the same"
-            ));
-        }
-        (FramesFrom::Domain(domain), _) | (_, Some(domain)) => folder.domain.clone_from(domain),
-        (FramesFrom::Device(..), None) => {}
+    if let (FramesFrom::Domain(domain), _) | (_, Some(domain)) = (&inputs.frames, service) {
+        folder.domain.clone_from(domain);
     }
     let by_service = address.service.is_some();
-    let mut record = RunRecord::new(name, seed, filmed.target_m, &folder.path);
+    let mut record = RunRecord::new(name, seed, inputs.target_m, &folder.path);
     record.operator = operator;
-    in_folder(&folder, record, |session, record| {
+    let done = |session: &mut Session, record: &mut RunRecord| {
         let stage = Stage::begin("start");
         watch_operator(session, arm, &address)?;
-        let rig = find_rig(session, (address.simulated, address.command))?;
-        let mut scene = match (&rig, filmed.calibration) {
-            (Some(rig), Some(camera)) if filmed.names_calibration => Scene {
-                camera,
-                ..Scene::of_rig(session, rig)?
-            },
-            (Some(rig), _) => Scene::of_rig(session, rig)?,
-            (None, Some(camera)) => Scene {
-                camera,
-                tip_rgb: None,
-                target_rgb: None,
-            },
-            (None, None) => bail!("the simulated rig that filmed is gone"),
-        };
-        let [tip_rgb, target_rgb] = filmed.colours;
-        scene.tip_rgb = tip_rgb.or(scene.tip_rgb);
-        scene.target_rgb = target_rgb.or(scene.target_rgb);
+        let rig = session.find::<RigRpc>(&RigRequest::Ports)?;
+        let told = rig.as_ref().map(|rig| Scene::of_rig(session, rig));
+        let told = told.transpose()?;
+        let of_file = inputs
+            .calibration
+            .filter(|_| inputs.names_calibration || told.is_none());
+        let colours = told.as_ref().and_then(|scene| scene.colours);
+        let camera = of_file.or(told.map(|scene| scene.camera));
+        let camera = camera.context("the simulated rig that filmed is gone")?;
+        let [tip_rgb, target_rgb] = inputs.colours;
+        record.tip_rgb = tip_rgb.or(colours.map(|[tip_rgb, _]| tip_rgb));
+        record.target_rgb = target_rgb.or(colours.map(|[_, target_rgb]| target_rgb));
         if !matches!(entry, Entry::WiggleAlone) {
-            let drawn = rig.is_some().then(|| random_target(seed));
-            let target_m = filmed.target_m.or(drawn);
-            let target_m = target_m.context("name the target with --target X,Y,Z")?;
+            let target_m = inputs.target_m.unwrap_or_else(|| random_target(seed));
             record.target_m = Some(target_m);
             if let Some(rig) = &rig {
                 let place = RigRequest::PlaceTarget { target_m };
@@ -371,15 +243,18 @@ fn on_camera(
             settings,
             limits,
             asks: asks(arm, &address),
+            held: arm.hold_to_run,
             acknowledges: arm.acknowledge,
             address,
-            frames: filmed.frames,
-            scene,
+            frames: inputs.frames,
+            camera,
             rig,
-            accept_unconfirmed: filmed.accept_unconfirmed,
-            robust: filmed.robust,
+            accept_unconfirmed: inputs.accept_unconfirmed,
+            robust: inputs.robust,
         };
-        let mut run = Run::start(&folder, session, record, setup, &stage)?;
-        run.go(entry).map_err(|error| of_service(by_service, error))
+        Run::start(&folder, session, record, setup, &stage)?.go(entry)
+    };
+    in_folder(&folder, record, |session, record| {
+        done(session, record).map_err(|error| of_service(by_service, error))
     })
 }

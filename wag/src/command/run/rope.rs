@@ -80,7 +80,7 @@ impl Run<'_> {
         let joints = self.film_joints(film)?;
         self.session.received.keypoints.clear();
         let request = CameraRequest::Track {
-            camera: Box::new(self.setup.scene.camera.clone()),
+            camera: Box::new(self.setup.camera.clone()),
             joints,
             pole: self.setup.settings.cell.pole,
             keypoints: KEYPOINTS,
@@ -128,7 +128,7 @@ impl Run<'_> {
         let request = PlannerRequest::Identify(Box::new(IdentifyRequest {
             first_stamp_ns: film.first_stamp_ns,
             frames: film.frames,
-            camera: self.setup.scene.camera.clone(),
+            camera: self.setup.camera.clone(),
             joints: self.film_joints(film)?,
             pole,
             appearance: appearance.into(),
@@ -141,15 +141,12 @@ impl Run<'_> {
         let tracked = self.record.track.as_ref();
         let unconfirmed = tracked.map_or_else(Vec::new, |tracked| tracked.unconfirmed.clone());
         self.record.stages.identify_s = stage.done(&format!(
-            "length {:.3} m, residual {:.2} px, film's clock {:+.1} ms, {} simulations",
+            "length {:.3} m, residual {:.2} px, clock offset {:+.1} ms, {} simulations",
             rope.params.length_m,
             rope.residual_px,
             1e3 * rope.time_offset_s,
             rope.simulations
         ));
-        for warning in &rope.warnings {
-            self.warn(warning);
-        }
         self.record.arm_lag_s = self.lag_s(film);
         let rope = KnownRope::identified(rope, unconfirmed);
         self.keep_rope(&rope)?;
@@ -159,6 +156,9 @@ impl Run<'_> {
     /// Keeps the rope in the run's folder.
     pub fn keep_rope(&mut self, rope: &KnownRope) -> anyhow::Result<()> {
         self.record.identified = rope.estimate().cloned();
+        for warning in rope.estimate().map_or(&[][..], |rope| &rope.warnings) {
+            self.warn(warning);
+        }
         rope.keep(&self.folder.file(files::ROPE))
     }
 

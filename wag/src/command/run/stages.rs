@@ -1,10 +1,13 @@
 //! The stages of a run from wiggle to throw: each hands the next what it found.
 
 use super::summary;
+use crate::command::area::response_for_plans;
 use crate::command::known_rope::KnownRope;
 use crate::command::motion;
-use crate::command::on_arm::AT_START;
-use crate::pipeline::{self, ArmAddress, ArmLink, BringUp, FramesFrom, RunFolder, Scene, execute};
+use crate::command::on_arm::{AT_START, enable, set_up_move};
+use crate::pipeline::{
+    self, ArmAddress, ArmLink, BringUp, FramesFrom, RunFolder, execute, keep_calibration,
+};
 use anyhow::{anyhow, bail};
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{Failure, Stage, output};
@@ -14,13 +17,13 @@ use planner::plan::{Shortcoming, shortcoming};
 use planner::service::{PlannerRequest, PlannerRpc};
 use planner::wiggle::wiggle;
 use rt_controller::os::now_ns;
-use run_log::{Film, RunRecord};
+use run_log::{Film, RunRecord, files};
 use session::Session;
 use shared_types::ipc::message::{
     CameraEvent, CameraRequest, CameraRpc, RigRequest, RigRpc, RopeAppearance,
 };
 use shared_types::ipc::rpc::RpcClient;
-use shared_types::{OperatingMode, Plan};
+use shared_types::{OperatingMode, Plan, StereoCamera};
 
 /// Speed of moves between poses, as a part of the fastest move.
 ///
@@ -37,6 +40,8 @@ const AFTER_THROW_NS: u64 = 600_000_000;
 pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 /// The same after any other move, where the swing of whatever was before decays by itself (s).
 const DECAYED_WITHIN_S: f64 = 180.0;
+/// What to do where the colours to look for are not known.
+const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
 /// How often the camera is asked for frames before the arm is enabled.
 const LOOKS: usize = 4;
 
@@ -60,10 +65,12 @@ pub struct Setup {
     pub address: ArmAddress,
     /// Whether the operator must confirm each motion.
     pub asks: bool,
+    /// Whether the operator holds a key for each motion, which no planned instant can wait for.
+    pub held: bool,
     /// Whether the operator knows why the arm was stopped before.
     pub acknowledges: bool,
     pub frames: FramesFrom,
-    pub scene: Scene,
+    pub camera: StereoCamera,
     pub rig: Option<RpcClient<RigRpc>>,
     pub accept_unconfirmed: bool,
     /// Ropes that a plan weighs beside the likeliest.
@@ -91,11 +98,11 @@ impl<'a> Run<'a> {
         setup: Setup,
         stage: &Stage,
     ) -> anyhow::Result<Self> {
-        let Setup { limits, scene, .. } = &setup;
-        scene.keep(folder)?;
-        let camera = Some(&scene.camera);
+        let Setup { limits, .. } = &setup;
+        keep_calibration(folder, &setup.camera)?;
+        let camera = Some(&setup.camera);
         pipeline::start_recorder(session, folder, limits, camera, record.target_m)?;
-        let camera = pipeline::start_camera(session, folder, &setup.frames, scene)?;
+        let camera = pipeline::start_camera(session, folder, &setup.frames, &setup.camera)?;
         let ping = PlannerRequest::Ping;
         let planner = match session.find(&ping)? {
             Some(running) => running,
@@ -108,8 +115,8 @@ impl<'a> Run<'a> {
             }
         };
         let arm = pipeline::controller(session, folder, limits, &setup.address)?;
-        let response = setup.address.arm_response.as_ref();
-        let following = response.map(|(_, response)| Following::new(response, limits));
+        let response = response_for_plans(&setup.address).map_err(|why| anyhow!("{why}"))?;
+        let following = response.map(|response| Following::new(&response, limits));
         let mut run = Self {
             folder,
             session,
@@ -121,6 +128,12 @@ impl<'a> Run<'a> {
             arm,
         };
         run.look(stage)?;
+        let is_thrown = run.record.target_m.is_some();
+        if is_thrown && run.record.target_rgb.is_none() {
+            run.warn(&format!(
+                "the throw will not be measured: {UNNAMED_COLOURS}"
+            ));
+        }
         run.record.stages.start_s = stage.done("controller, camera and planner are up");
         Ok(run)
     }
@@ -128,14 +141,22 @@ impl<'a> Run<'a> {
     /// A camera that sends nothing is known before the arm is enabled.
     fn look(&mut self, stage: &Stage) -> anyhow::Result<()> {
         let request = CameraRequest::WaitStill { timeout_s: 0.0 };
-        let mut seen = Ok(());
-        for _ in 0..LOOKS {
-            seen = self.ask_camera(&request, 5.0, stage).map(drop);
+        let mut seen = self.ask_camera(&request, 5.0, stage);
+        for _ in 1..LOOKS {
             if seen.is_ok() {
                 break;
             }
+            seen = self.ask_camera(&request, 5.0, stage);
         }
-        seen
+        let camera = &self.setup.camera;
+        let calibrated = [camera.width_px, camera.height_px];
+        match seen? {
+            CameraEvent::Still { size_px, .. } if size_px == calibrated => Ok(()),
+            CameraEvent::Still { size_px, .. } => bail!(
+                "the camera sends images of {size_px:?} pixels, but its calibration is for {calibrated:?}"
+            ),
+            other => bail!("the camera process answered with {other:?}"),
+        }
     }
 
     /// From the entry to its end: that of the throw, but for a wiggle alone.
@@ -148,12 +169,14 @@ impl<'a> Run<'a> {
             }
             Entry::Plan(plan) => {
                 self.keep_plan(&plan)?;
+                self.check_throw(&plan)?;
                 self.bring_up(&plan.trajectory)?;
                 *plan
             }
             Entry::Rope(rope) => {
                 self.keep_rope(&rope)?;
                 let plan = self.plan(&rope)?;
+                self.confirm_move("The arm will be enabled and move to the throw's start.")?;
                 self.bring_up(&plan.trajectory)?;
                 plan
             }
@@ -161,7 +184,7 @@ impl<'a> Run<'a> {
                 let (motion, film, appearance) = self.tracked()?;
                 let rope = self.identify(&film, appearance)?;
                 let plan = self.plan(&rope)?;
-                if self.setup.asks {
+                if self.setup.asks || self.setup.held {
                     self.turn(&plan)?;
                 } else {
                     self.settle(&rope.params, &film, &motion, &plan)?;
@@ -211,7 +234,7 @@ impl<'a> Run<'a> {
         stage.say("waiting for the rope to hang still");
         let request = CameraRequest::WaitStill { timeout_s };
         match self.ask_camera(&request, timeout_s + 5.0, stage)? {
-            CameraEvent::Still { still } => Ok(still),
+            CameraEvent::Still { still, .. } => Ok(still),
             other => bail!("the camera process answered with {other:?}"),
         }
     }
@@ -228,20 +251,21 @@ impl<'a> Run<'a> {
         pipeline::arm_for(self.session, &self.arm, operating_mode, Some(confirmed_ns))
     }
 
+    /// Lets the operator confirm a move that begins minutes after what was confirmed before.
+    fn confirm_move(&mut self, what: &str) -> anyhow::Result<()> {
+        if self.setup.asks {
+            self.session.confirm(what, "MOVE")?;
+        }
+        Ok(())
+    }
+
     /// Enables the arm, moves to the start pose, waits for the rope.
     fn bring_up(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
         let stage = Stage::begin("bring-up");
-        self.session.take_operator()?;
-        if let Some(service) = &self.setup.address.service {
-            service.require_unchanged(self.session, &self.arm)?;
-        }
         let mut found = BringUp::default();
-        let acknowledges = self.setup.acknowledges;
-        let enabled = pipeline::enable(self.session, &self.arm, acknowledges, &mut found);
+        let of = (&self.setup.address, self.setup.acknowledges);
+        let enabled = enable(self.session, &self.arm, of, &mut found);
         self.record.bring_up = found.steps_json();
-        for warning in &found.warnings {
-            tracing::warn!("{warning}");
-        }
         self.record.warnings.extend(found.warnings);
         enabled?;
         self.move_to_start(motion, &stage)?;
@@ -257,9 +281,7 @@ impl<'a> Run<'a> {
 
     /// Moves to the start of `motion` at set-up speed, and waits for the rope.
     fn move_to_start(&mut self, motion: &JointTrajectory, stage: &Stage) -> anyhow::Result<()> {
-        self.session.await_hold()?;
-        pipeline::arm_for(self.session, &self.arm, OperatingMode::SetUp, None)?;
-        pipeline::move_to(self.session, &self.arm, motion.start(), MOVE_SPEED)?;
+        set_up_move(self.session, &self.arm, motion.start(), MOVE_SPEED)?;
         if !self.wait_still(stage, DECAYED_WITHIN_S)? {
             self.warn(&format!(
                 "the rope still swings after {DECAYED_WITHIN_S} s, and what follows takes it to hang still"
@@ -270,6 +292,7 @@ impl<'a> Run<'a> {
 
     /// Turns to the throw's start.
     fn turn(&mut self, plan: &Plan) -> anyhow::Result<()> {
+        self.confirm_move("The arm will move to the throw's start.")?;
         let stage = Stage::begin("settle");
         self.move_to_start(&plan.trajectory, &stage)?;
         self.record.stages.settle_s = stage.done("arm stands at the throw's start");
@@ -346,7 +369,11 @@ impl<'a> Run<'a> {
             .map_err(refused)?;
         match shortcoming(plan) {
             Some(Shortcoming { message, is_severe }) if is_severe && !address.simulated => {
-                bail!("{message}; nothing is thrown")
+                let plan = self.folder.file(files::PLAN);
+                bail!(
+                    "{message}; nothing is thrown (`wag throw {}` would)",
+                    plan.display()
+                )
             }
             _ => Ok(()),
         }
@@ -368,18 +395,15 @@ impl<'a> Run<'a> {
     /// Measures the closest approach of tip and target by the camera. That it could not
     /// see the throw does not undo the throw; it is reported.
     fn score(&mut self) {
-        let scene = &self.setup.scene;
         let tracked = self.record.track.as_ref();
-        let tip_rgb = scene
-            .tip_rgb
-            .or(tracked.map(|track| track.appearance.lead_rgb));
-        let Some((tip_rgb, target_rgb)) = tip_rgb.zip(scene.target_rgb) else {
-            let unnamed = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
-            return self.record.set_score(Err(anyhow!(unnamed)));
+        let tracked = tracked.map(|track| track.appearance.lead_rgb);
+        self.record.tip_rgb = self.record.tip_rgb.or(tracked);
+        let Some((tip_rgb, target_rgb)) = self.record.tip_rgb.zip(self.record.target_rgb) else {
+            return self.record.set_score(Err(anyhow!(UNNAMED_COLOURS)));
         };
         let stage = Stage::begin("score");
         let request = CameraRequest::Score {
-            camera: Box::new(self.setup.scene.camera.clone()),
+            camera: Box::new(self.setup.camera.clone()),
             tip_rgb,
             target_rgb,
             strobe: Some(self.folder.file("throw.png").display().to_string()),

@@ -13,13 +13,17 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
+    /// As it should be.
     Pass,
     /// It works, but less well than it could.
     Warn,
+    /// Not fit.
     Fail,
 }
 
 impl Verdict {
+    /// As it stands in a table.
+    #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::Pass => "pass",
@@ -32,6 +36,8 @@ impl Verdict {
         if good { Self::Pass } else { Self::Warn }
     }
 
+    /// A pass only of what is good.
+    #[must_use]
     pub const fn fail_unless(good: bool) -> Self {
         if good { Self::Pass } else { Self::Fail }
     }
@@ -40,8 +46,11 @@ impl Verdict {
 /// One thing that was looked at.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
+    /// What was looked at.
     pub name: &'static str,
+    /// What that means.
     pub verdict: Verdict,
+    /// What was there.
     pub found: String,
     /// What to do; empty when nothing is to be done.
     pub remedy: String,
@@ -59,6 +68,7 @@ impl Finding {
     }
 
     /// What was found, with the remedy for what is not as it should be.
+    #[must_use]
     pub fn new(name: &'static str, verdict: Verdict, found: String, remedy: &str) -> Self {
         let remedy = match verdict {
             Verdict::Pass => String::new(),

@@ -31,6 +31,8 @@ pub struct Machine<'a> {
 }
 
 impl Machine<'static> {
+    /// The one that this runs on.
+    #[must_use]
     pub fn here() -> Self {
         let disk = rustix::fs::statvfs(".").ok();
         Self {

@@ -1,0 +1,228 @@
+//! What the command line and an earlier run say, checked before an arm is looked for.
+
+use crate::cli::{CameraArgs, FromStage, RunArgs, WiggleArgs};
+use crate::command::identify;
+use crate::command::known_rope::KnownRope;
+use crate::command::plan::LOOK;
+use crate::command::plan_again::check_thrown;
+use crate::command::run::Entry;
+use crate::command::unconfirmed::confirm;
+use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene, port_of_rig};
+use cli_output::{Failure, OrInput, Outcome};
+use planner::PlannerConfig;
+use planner::plan::{check_reach, clear_of_arm};
+use run_log::Run as RecordedRun;
+use run_log::files::{self, read_plan};
+use serde_json::Value;
+use shared_types::rope::RANGES;
+use shared_types::{StereoCamera, Task};
+use std::path::{Path, PathBuf};
+
+/// Colours of tip and target, as far as they are known.
+type Colours = [Option<[u8; 3]>; 2];
+
+/// Camera, target and rope as they are named.
+#[derive(Debug)]
+pub struct Inputs {
+    pub frames: FramesFrom,
+    /// What a file tells of the camera.
+    pub calibration: Option<StereoCamera>,
+    /// Whether the command line names that file: then it goes before a simulated rig's.
+    pub names_calibration: bool,
+    /// The command port of the simulated rig that films, if one does.
+    rig_port: Option<u16>,
+    pub target_m: Option<[f64; 3]>,
+    pub colours: Colours,
+    pub accept_unconfirmed: bool,
+    pub robust: usize,
+}
+
+/// A target that is named must lie where a rope can strike.
+pub fn check_target(target_m: [f64; 3], settings: &PlannerConfig) -> Outcome {
+    check_reach(target_m, RANGES[1].max, &settings.cell).or_input()?;
+    clear_of_arm(target_m, &settings.cell).or_input()
+}
+
+/// The stage that a run is resumed from, and the folder of that run.
+fn resumed(args: &RunArgs) -> Outcome<Option<(FromStage, PathBuf)>> {
+    let Some((stage, run)) = args.from().map_err(|why| bad_input!("{why}"))? else {
+        return Ok(None);
+    };
+    let folder = RecordedRun::open(&run).or_input()?.folder().to_owned();
+    let unused = [
+        ("--target", args.target.is_some(), stage == FromStage::Throw),
+        ("--robust", args.robust > 0, stage == FromStage::Throw),
+        (
+            "--length",
+            args.length.is_some(),
+            stage != FromStage::Identify,
+        ),
+        (
+            "--lead-mass",
+            args.lead_mass.is_some(),
+            stage != FromStage::Identify,
+        ),
+    ];
+    for (option, is_named, is_known) in unused {
+        if is_named && is_known {
+            return Err(bad_input!(
+                "{option} changes nothing of what `{}` has found already: resume it from an earlier stage",
+                folder.display()
+            ));
+        }
+    }
+    Ok(Some((stage, folder)))
+}
+
+/// Where the run begins, unless it corrects the throw of another.
+pub fn entry(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Entry> {
+    let Some((stage, folder)) = resumed(args)? else {
+        return Ok(Entry::Wiggle);
+    };
+    let accept = args.accept_unconfirmed;
+    Ok(match stage {
+        FromStage::Identify => {
+            let (estimate, unconfirmed) = identify::again(&folder, &settings.identify, accept)?;
+            Entry::Rope(Box::new(KnownRope::identified(estimate, unconfirmed)))
+        }
+        FromStage::Plan => {
+            let known = KnownRope::read(&folder.join(files::ROPE)).or_input()?;
+            confirm(&known.unconfirmed, accept, LOOK).or_failed()?;
+            known.ensemble(args.robust, args.seed).or_input()?;
+            Entry::Rope(Box::new(known))
+        }
+        FromStage::Throw => {
+            let plan = read_plan(&folder.join(files::PLAN)).or_input()?;
+            check_thrown(&plan, accept)?;
+            if plan.task != Task::Strike {
+                let task = plan.task.name();
+                return Err(bad_input!(
+                    "the plan of `{}` is a {task}'s",
+                    folder.display()
+                ));
+            }
+            Entry::Plan(Box::new(plan))
+        }
+    })
+}
+
+/// What an earlier run tells of its target: where it was, and the colours of tip and target.
+fn earlier(args: &RunArgs) -> Outcome<(Option<[f64; 3]>, Colours)> {
+    let resumed = resumed(args)?.map(|(_, folder)| folder);
+    let Some(folder) = resumed.or_else(|| args.again.clone()) else {
+        return Ok((None, [None; 2]));
+    };
+    let run = RecordedRun::open(&folder).or_input()?;
+    let planned = run.plan().or_input()?.map(|plan| plan.target_m);
+    let summary = run.summary().or_input()?.unwrap_or_default();
+    let colour = |value: &Value| serde_json::from_value(value.clone()).ok();
+    let tip_rgb = colour(&summary["tip_rgb"]).or_else(|| colour(&summary["track"]["lead_rgb"]));
+    let target_m = serde_json::from_value(summary["target_m"].clone()).ok();
+    Ok((
+        planned.or(target_m),
+        [tip_rgb, colour(&summary["target_rgb"])],
+    ))
+}
+
+fn uncalibrated(from: &FramesFrom) -> Failure {
+    let nobody = match from {
+        FramesFrom::Domain(domain) => {
+            format!("no simulated rig films in domain `{domain}`, and where another camera ")
+        }
+        FramesFrom::Device(_) => "where the camera ".to_owned(),
+    };
+    bad_input!(
+        "{nobody}stands is not known: name its camera.toml with --calibration, or put it into the folder of configurations (~/.config/wag); `wag calib extrinsics` estimates it"
+    )
+}
+
+impl Inputs {
+    /// What films, which may be a simulated rig.
+    fn of_camera(args: &CameraArgs, out: Option<&Path>) -> Outcome<Self> {
+        let Some(named) = &args.camera else {
+            return Err(bad_input!(
+                "name who films with --camera: the shared-memory domain of a camera that runs, or a device, /dev/videoN"
+            ));
+        };
+        out.map_or(Ok(()), RunFolder::refuse_existing)?;
+        let calibration = Scene::of_file(args.calibration.as_deref()).or_input()?;
+        let (frames, rig_port) = if named.starts_with('/') {
+            if !Path::new(named).exists() {
+                return Err(bad_input!(
+                    "there is no camera `{named}`; `ls /dev/video*` lists them"
+                ));
+            }
+            (FramesFrom::Device(named.into()), None)
+        } else {
+            let rig_port = port_of_rig(named).or_input()?;
+            (FramesFrom::Domain(named.clone()), rig_port)
+        };
+        if calibration.is_none() && rig_port.is_none() {
+            return Err(uncalibrated(&frames));
+        }
+        Ok(Self {
+            frames,
+            calibration,
+            names_calibration: args.calibration.is_some(),
+            rig_port,
+            target_m: None,
+            colours: [None; 2],
+            accept_unconfirmed: false,
+            robust: 0,
+        })
+    }
+
+    pub fn of_wiggle(args: &WiggleArgs) -> Outcome<Self> {
+        Ok(Self {
+            accept_unconfirmed: args.accept_unconfirmed,
+            ..Self::of_camera(&args.camera, args.out.as_deref())?
+        })
+    }
+
+    pub fn of_run(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Self> {
+        let found = Self::of_camera(&args.camera, args.out.as_deref())?;
+        let named = args.target.map(|target| target.0);
+        named.map_or(Ok(()), |target_m| check_target(target_m, settings))?;
+        let (target_m, [tip_rgb, target_rgb]) = earlier(args)?;
+        let target_m = named.or(target_m);
+        if target_m.is_none() && found.rig_port.is_none() {
+            return Err(bad_input!("name the target with --target X,Y,Z"));
+        }
+        Ok(Self {
+            target_m,
+            colours: [
+                args.tip_rgb.map(|named| named.0).or(tip_rgb),
+                args.target_rgb.map(|named| named.0).or(target_rgb),
+            ],
+            accept_unconfirmed: args.accept_unconfirmed,
+            robust: args.robust,
+            ..found
+        })
+    }
+
+    /// Refuses an arm that the camera does not film, or a controller in another domain.
+    pub fn check_arm(&self, address: &ArmAddress) -> Outcome {
+        if let Some(port) = self.rig_port {
+            if !address.simulated {
+                return Err(bad_input!(
+                    "the camera is a simulated rig's, but the arm does not prove that it is simulated: name the camera that films this arm"
+                ));
+            }
+            if port != address.command {
+                return Err(bad_input!(
+                    "the camera films the simulated arm with command port {port}, not the one with port {}: name the ports of the one (--command-port), or the camera of the other",
+                    address.command
+                ));
+            }
+        }
+        let service = address.service.as_ref().map(|s| &s.config.domain);
+        match (&self.frames, service) {
+            (FramesFrom::Domain(camera), Some(controller)) if camera != controller => {
+                Err(bad_input!(
+                    "the camera runs in shared-memory domain `{camera}`, the controller in `{controller}`: start both in the same"
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+}
