@@ -17,11 +17,20 @@ mod command;
 mod config;
 mod pipeline;
 
-use clap::Parser;
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = match cli::Cli::try_parse() {
+    // What is named goes into JSON files, which are UTF-8.
+    let parsed = match std::env::args_os().find(|arg| arg.to_str().is_none()) {
+        Some(arg) => Err(cli::Cli::command().error(
+            ErrorKind::InvalidUtf8,
+            format!("`{}` is not UTF-8: rename it", arg.display()),
+        )),
+        None => cli::Cli::try_parse(),
+    };
+    let cli = match parsed {
         Ok(cli) => cli,
         Err(error) => return cli_output::refuse_usage(&error),
     };

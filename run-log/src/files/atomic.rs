@@ -66,7 +66,10 @@ fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     tempfile::Builder::new()
         .permissions(PermissionsExt::from_mode(0o666))
         .tempfile_in(folder_of(path))
-        .map_err(|e| io::Error::from(e.kind()))
+        .map_err(|e| match e.kind() {
+            ErrorKind::NotFound => io::Error::new(ErrorKind::NotFound, "there is no such folder"),
+            kind => kind.into(),
+        })
 }
 
 /// What a failure to write `path` is called.

@@ -2,12 +2,13 @@
 //! field.
 
 use super::atomic::write_atomic;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use arm_model::response::Excitation;
 use arm_model::{ArmResponse, Cell};
 use serde::de::DeserializeOwned;
 use shared_types::Plan;
 use shared_types::plan::trajectory_hash_hex;
+use std::io::ErrorKind;
 use std::path::Path;
 
 /// What a failure to read `path` is called.
@@ -20,7 +21,15 @@ pub(crate) fn cannot_read(path: &Path) -> impl FnOnce() -> String + '_ {
 
 /// Reads a text file.
 pub fn read_text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).with_context(cannot_read(path))
+    std::fs::read_to_string(path).map_err(|error| {
+        let name = path.display();
+        let why = match error.kind() {
+            ErrorKind::IsADirectory => "it is a folder",
+            ErrorKind::InvalidData => "it is not a text file in UTF-8",
+            _ => return anyhow::Error::new(error).context(cannot_read(path)()),
+        };
+        anyhow!("cannot read `{name}`: {why}")
+    })
 }
 
 /// Reads JSON.

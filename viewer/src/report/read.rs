@@ -52,7 +52,7 @@ pub fn simulated_rope(run: &Path) -> anyhow::Result<Vec<RopeMotion>> {
 pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData> {
     ensure!(
         run.is_dir(),
-        "`{}` is not a folder; name a run folder as made by wag demo, throw, wiggle or record",
+        "`{}` is not a folder; name a run folder as made by wag run, demo, throw, wiggle or record",
         run.display()
     );
     let of_run = Run::open(run)?;

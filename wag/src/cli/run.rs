@@ -110,7 +110,8 @@ pub struct DemoArgs {
         ("drape", "", Task::Drape),
     ]))]
     pub task: Task,
-    /// Seed of the hidden rope, the target, the noise and every search.
+    /// Seed of the hidden rope, the target, the noise and every search. When frames are taken is the
+    /// machine's affair, so that two demos of one seed differ a little.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
     /// Folder for the run; it must not exist. Default: runs/TIME-demo-SEED.

@@ -1,7 +1,7 @@
 //! Values on the command line, with what they may be.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use std::net::{IpAddr, ToSocketAddrs};
+use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::str::FromStr;
 
 /// One of these by its name, each with what `--help` says of it; one of which it says
@@ -59,6 +59,9 @@ pub(super) fn mass_kg(text: &str) -> Result<f64, String> {
 pub(super) fn host(text: &str) -> Result<IpAddr, String> {
     if let Ok(address) = text.parse() {
         return Ok(address);
+    }
+    if text.parse::<SocketAddr>().is_ok() {
+        return Err(format!("`{text}` has a port: name it with --command-port"));
     }
     let found: Vec<IpAddr> = (text, 0u16)
         .to_socket_addrs()

@@ -86,7 +86,8 @@ fn compare(first: &Path, second: &Path) -> Outcome<Option<Value>> {
     let mut shown = table::numbers(["value", "first", "second", "by"], 0, rows);
     shown.set_content_arrangement(ContentArrangement::Dynamic);
     println!("{}", shown.set_width(100));
-    println!("{} differences", found.len());
+    let plural = if found.len() == 1 { "" } else { "s" };
+    println!("{} difference{plural}", found.len());
     Ok(Some(json!({
         "ok": true, "command": "ledger compare", "first": first, "second": second, "differences": found,
     })))

@@ -184,6 +184,7 @@ fn controller_config(
     if arm.simulated {
         // A simulated arm shares this machine with everything else: its silence
         // says more about the machine's load than about a cable.
+        config.thresholds.operator_timeout_ms = Some(2000.0);
         config.thresholds.reply_stall_ms = Some(500.0);
         config.thresholds.unanswered_max = Some(125);
         config.thresholds.report_stale_ms = Some(500.0);

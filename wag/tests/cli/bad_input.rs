@@ -3,7 +3,10 @@
 
 use super::cases::{FAILED, MACHINES, RECORDS, ROPES, SIM_ROPE};
 use super::files::{LINKS, prepare};
-use super::support::{are_refused_in, refused_in, wag_in};
+use super::support::{are_refused_in, command, refused_in, said, wag_in};
+use std::ffi::OsStr;
+use std::fs;
+use std::os::unix::ffi::OsStrExt;
 
 #[test]
 fn wrong_input_gets_one_clear_line_and_leaves_nothing_behind() {
@@ -37,4 +40,35 @@ fn json_errors_are_json_and_no_runs_are_no_error() {
     let reported: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(reported["ok"], false);
     assert!(reported["error"].as_str().unwrap().contains("none.json"));
+}
+
+#[test]
+fn a_name_that_is_not_utf_8_is_refused_before_anything_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = folder.path().join(OsStr::from_bytes(b"bad\xff.csv"));
+    for line in ["wiggle --csv", "explain", "man", "throw --dry-run"] {
+        let output = command(line).arg(&name).output().unwrap();
+        let said = said(&output);
+        assert_eq!(output.status.code(), Some(2), "wag {line}: {said}");
+        assert!(
+            said.contains("is not UTF-8") && !said.contains("panicked"),
+            "{said}"
+        );
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn what_is_no_text_file_is_called_by_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("binary.json"), [0xff, 0xfe, 0x00]).unwrap();
+    for (line, said) in [
+        ("check .", "it is a folder"),
+        ("check binary.json", "not a text file in UTF-8"),
+        ("check none.json", "check the path and its permissions"),
+        ("wiggle --csv no/w.csv", "there is no such folder"),
+    ] {
+        let refusal = refused_in(folder.path(), 2, line);
+        assert!(refusal.contains(said), "wag {line}: {refusal}");
+    }
 }

@@ -180,10 +180,10 @@ impl Inputs {
     }
 
     pub fn of_run(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Self> {
-        let found = Self::of_camera(&args.camera, args.out.as_deref())?;
         let named = args.target.map(|target| target.0);
         named.map_or(Ok(()), |target_m| check_target(target_m, settings))?;
         let (target_m, [tip_rgb, target_rgb]) = earlier(args)?;
+        let found = Self::of_camera(&args.camera, args.out.as_deref())?;
         let target_m = named.or(target_m);
         if target_m.is_none() && found.rig_port.is_none() {
             return Err(bad_input!("name the target with --target X,Y,Z"));
