@@ -1,6 +1,7 @@
 //! `wag run`: from wiggle to throw with an arm and a camera; what `wag demo` does on a rig of its
 //! own.
 
+mod filmed;
 mod inputs;
 mod rope;
 mod stages;

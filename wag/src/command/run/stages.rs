@@ -1,27 +1,23 @@
 //! The stages of a run from wiggle to throw: each hands the next what it found.
 
-use super::summary;
 use crate::command::area::response_for_plans;
 use crate::command::known_rope::KnownRope;
 use crate::command::motion;
 use crate::command::on_arm::{AT_START, enable, set_up_move};
 use crate::pipeline::{
-    self, ArmAddress, ArmLink, BringUp, FramesFrom, RunFolder, execute, keep_calibration,
+    self, ArmAddress, ArmLink, BringUp, FramesFrom, RunFolder, keep_calibration,
 };
 use anyhow::{anyhow, bail};
 use arm_model::{JointTrajectory, Limits};
-use cli_output::{Failure, Stage, output};
+use cli_output::{Stage, output};
 use planner::PlannerConfig;
 use planner::arm_response::Following;
-use planner::plan::{Shortcoming, shortcoming};
 use planner::service::{PlannerRequest, PlannerRpc};
 use planner::wiggle::wiggle;
 use rt_controller::os::now_ns;
-use run_log::{Film, RunRecord, files};
+use run_log::{Film, RunRecord};
 use session::Session;
-use shared_types::ipc::message::{
-    CameraEvent, CameraRequest, CameraRpc, RigRequest, RigRpc, RopeAppearance,
-};
+use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRpc, RopeAppearance};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::{OperatingMode, Plan, StereoCamera};
 
@@ -30,18 +26,12 @@ use shared_types::{OperatingMode, Plan, StereoCamera};
 /// Slow enough that the move lasts several periods of the rope's pendulum and
 /// leaves it with millimetres of swing.
 const MOVE_SPEED: f64 = 0.04;
-/// Frames of a wiggle (paper: 400 at 60 Hz).
-const WIGGLE_FRAMES: u32 = 400;
-/// Frames of a throw: two and a half seconds.
-const THROW_FRAMES: u32 = 150;
-/// Time after the last setpoint that still belongs to the throw (ns).
-const AFTER_THROW_NS: u64 = 600_000_000;
 /// Longest wait for the rope to hang still after a move that was planned to bring it to rest (s).
 pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 /// The same after any other move, where the swing of whatever was before decays by itself (s).
 const DECAYED_WITHIN_S: f64 = 180.0;
 /// What to do where the colours to look for are not known.
-const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
+pub(super) const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
 /// How often the camera is asked for frames before the arm is enabled.
 const LOOKS: usize = 4;
 
@@ -84,7 +74,7 @@ pub struct Run<'a> {
     pub(super) record: &'a mut RunRecord,
     pub(super) setup: Setup,
     pub(super) following: Option<Following>,
-    camera: RpcClient<CameraRpc>,
+    pub(super) camera: RpcClient<CameraRpc>,
     pub(super) planner: RpcClient<PlannerRpc>,
     pub(super) arm: ArmLink,
 }
@@ -298,144 +288,10 @@ impl<'a> Run<'a> {
         self.record.stages.settle_s = stage.done("arm stands at the throw's start");
         Ok(())
     }
-
-    /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
-    /// finished whatever becomes of the film, of both eyes. A wiggle is made for the film's
-    /// sake, which needs the left eye only, and is braked when it is lost.
-    fn film(
-        &mut self,
-        frames: u32,
-        trajectory: &JointTrajectory,
-        throw: bool,
-        stage: &Stage,
-    ) -> anyhow::Result<Film> {
-        let request = CameraRequest::Record {
-            frames,
-            both_images: throw,
-        };
-        let recording = self.camera.call(&request)?;
-        let first_stamp_ns = match answered(self.session.next(&recording, 5.0)?)? {
-            CameraEvent::Recording { first_stamp_ns } => first_stamp_ns,
-            other => bail!("the camera process answered a recording with {other:?}"),
-        };
-        let stream = |session: &mut Session| execute(session, &self.arm, trajectory);
-        let motion = if throw {
-            self.session.committed(stream)?
-        } else {
-            stream(self.session)?
-        };
-        let within_s = f64::from(frames) / 15.0 + 5.0;
-        let event = self.session.finish(&recording, within_s, |event| {
-            if let CameraEvent::Progress(p) = event {
-                stage.progress(p);
-            }
-        })?;
-        match answered(event)? {
-            CameraEvent::Recorded {
-                frames, dropped, ..
-            } => Ok(Film {
-                first_stamp_ns,
-                frames,
-                dropped,
-                motion,
-            }),
-            other => bail!("the camera process answered a recording with {other:?}"),
-        }
-    }
-
-    /// Streams the wiggle and films it.
-    fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
-        self.arm_for(OperatingMode::Wiggle)?;
-        let stage = Stage::begin("wiggle");
-        let film = self.film(WIGGLE_FRAMES, wiggle, false, &stage)?;
-        self.record.set_wiggle(film);
-        self.record.stages.wiggle_s = stage.done(&summary::of_film(&film));
-        Ok(film)
-    }
-
-    /// Refuses a throw that must not be sent, or that would not do what it is for; on a simulated
-    /// arm the latter is but a warning.
-    pub(super) fn check_throw(&self, plan: &Plan) -> anyhow::Result<()> {
-        let (trajectory, address) = (&plan.trajectory, &self.setup.address);
-        let refused = |failure: Failure| anyhow!("{failure}");
-        motion::check(
-            Some(address),
-            &self.setup.limits,
-            trajectory,
-            OperatingMode::Throw,
-        )
-        .map_err(refused)?;
-        motion::require_measured_joints(address, trajectory, OperatingMode::Throw)
-            .map_err(refused)?;
-        match shortcoming(plan) {
-            Some(Shortcoming { message, is_severe }) if is_severe && !address.simulated => {
-                let plan = self.folder.file(files::PLAN);
-                bail!(
-                    "{message}; nothing is thrown (`wag throw {}` would)",
-                    plan.display()
-                )
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Throws once, open loop, filmed.
-    fn throw(&mut self, plan: &Plan) -> anyhow::Result<Film> {
-        self.arm_for(OperatingMode::Throw)?;
-        let stage = Stage::begin("throw");
-        // Empties the histograms, so that they hold this throw alone.
-        pipeline::latency(self.session, &self.arm)?;
-        let film = self.film(THROW_FRAMES, &plan.trajectory, true, &stage)?;
-        self.record.set_throw(film);
-        self.record.latency = Some(pipeline::latency(self.session, &self.arm)?);
-        self.record.stages.throw_s = stage.done(&summary::of_film(&film));
-        Ok(film)
-    }
-
-    /// Measures the closest approach of tip and target by the camera. That it could not
-    /// see the throw does not undo the throw; it is reported.
-    fn score(&mut self) {
-        let tracked = self.record.track.as_ref();
-        let tracked = tracked.map(|track| track.appearance.lead_rgb);
-        self.record.tip_rgb = self.record.tip_rgb.or(tracked);
-        let Some((tip_rgb, target_rgb)) = self.record.tip_rgb.zip(self.record.target_rgb) else {
-            return self.record.set_score(Err(anyhow!(UNNAMED_COLOURS)));
-        };
-        let stage = Stage::begin("score");
-        let request = CameraRequest::Score {
-            camera: Box::new(self.setup.camera.clone()),
-            tip_rgb,
-            target_rgb,
-            strobe: Some(self.folder.file("throw.png").display().to_string()),
-        };
-        let score = match self.ask_camera(&request, 60.0, &stage) {
-            Ok(CameraEvent::Scored(score)) => Ok(score),
-            Ok(other) => Err(anyhow!("the camera process answered with {other:?}")),
-            Err(reason) => Err(reason),
-        };
-        self.record.stages.score_s = stage.done(&match &score {
-            Ok(s) => format!("by camera {:.1} cm", 100.0 * s.closest_m),
-            Err(_) => "the camera could not measure the throw".to_owned(),
-        });
-        self.record.set_score(score);
-    }
-
-    /// Only now a rig is asked what really happened.
-    fn compare_with_truth(&mut self, throw: &Film) -> anyhow::Result<()> {
-        let Some(rig) = &self.setup.rig else {
-            return Ok(());
-        };
-        let request = RigRequest::Truth {
-            from_ns: throw.motion.start_ns,
-            to_ns: throw.motion.end_ns + AFTER_THROW_NS,
-        };
-        let truth = self.session.ask(rig, &request, 10.0, |_| ())?;
-        self.record.set_truth(truth)
-    }
 }
 
 /// An event of the camera that is no failure.
-fn answered(event: CameraEvent) -> anyhow::Result<CameraEvent> {
+pub(super) fn answered(event: CameraEvent) -> anyhow::Result<CameraEvent> {
     match event {
         CameraEvent::Failed { message } => bail!(message),
         event => Ok(event),
