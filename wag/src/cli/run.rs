@@ -41,7 +41,7 @@ pub struct RunArgs {
     pub from: Vec<String>,
     /// Throw the strike of this run again, changed so that its miss is taken out.
     #[arg(long, value_name = "RUN", conflicts_with_all = [
-        "target", "lead_mass", "length", "robust", "dry_run",
+        "target", "lead_mass", "length", "robust", "dry_run", "seed",
     ])]
     pub again: Option<PathBuf>,
     /// Colour of the target, R,G,B from 0 to 255: by it the film of the throw tells how much it
@@ -84,8 +84,10 @@ pub enum FromStage {
 impl RunArgs {
     /// Which run is resumed, and where; `Err` says what is known instead.
     pub fn from(&self) -> Result<Option<(FromStage, PathBuf)>, String> {
-        let [stage, run] = self.from.as_slice() else {
-            return Ok(None);
+        let (stage, run) = match self.from.as_slice() {
+            [] => return Ok(None),
+            [stage, run] => (stage, run),
+            _ => return Err("--from resumes one run: name it once".to_owned()),
         };
         let stage = match stage.as_str() {
             "identify" => FromStage::Identify,

@@ -7,6 +7,7 @@ use crate::pipeline::{self, execute};
 use anyhow::{anyhow, bail};
 use arm_model::JointTrajectory;
 use cli_output::{Failure, Stage};
+use planner::arm_response::Following;
 use planner::plan::{Shortcoming, shortcoming};
 use run_log::{Film, files};
 use session::Session;
@@ -23,7 +24,7 @@ const AFTER_THROW_NS: u64 = 600_000_000;
 impl Run<'_> {
     /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
     /// finished whatever becomes of the film, of both eyes. A wiggle is made for the film's
-    /// sake, which needs the left eye only, and is braked when it is lost.
+    /// sake, which needs the left eye only, and is braked when the process that keeps it ends.
     fn film(
         &mut self,
         frames: u32,
@@ -52,17 +53,24 @@ impl Run<'_> {
                 stage.progress(p);
             }
         })?;
-        match answered(event)? {
-            CameraEvent::Recorded {
+        let [frames, dropped] = match answered(event) {
+            Ok(CameraEvent::Recorded {
                 frames, dropped, ..
-            } => Ok(Film {
-                first_stamp_ns,
-                frames,
-                dropped,
-                motion,
-            }),
-            other => bail!("the camera process answered a recording with {other:?}"),
-        }
+            }) => [frames, dropped],
+            Ok(other) => bail!("the camera process answered a recording with {other:?}"),
+            // What was thrown was thrown.
+            Err(lost) if throw => {
+                self.record.set_score(Err(lost));
+                [0, 0]
+            }
+            Err(lost) => return Err(lost),
+        };
+        Ok(Film {
+            first_stamp_ns,
+            frames,
+            dropped,
+            motion,
+        })
     }
 
     /// Streams the wiggle and films it.
@@ -75,8 +83,9 @@ impl Run<'_> {
         Ok(film)
     }
 
-    /// Refuses a throw that must not be sent, or that would not do what it is for; on a simulated
-    /// arm the latter is but a warning.
+    /// Refuses a throw that must not be sent, or that would not do what it is for: one planned for
+    /// an arm that follows otherwise, or that is predicted to miss; on a simulated arm both are
+    /// allowed.
     pub fn check_throw(&self, plan: &Plan) -> anyhow::Result<()> {
         let (trajectory, address) = (&plan.trajectory, &self.setup.address);
         let refused = |failure: Failure| anyhow!("{failure}");
@@ -89,6 +98,15 @@ impl Run<'_> {
         .map_err(refused)?;
         motion::require_measured_joints(address, trajectory, OperatingMode::Throw)
             .map_err(refused)?;
+        let follows = self.following.as_ref().map(Following::source);
+        if plan.arm_response.as_deref() != follows && !address.simulated {
+            let named = |source: Option<&str>| source.unwrap_or("none").to_owned();
+            bail!(
+                "the throw was planned for an arm with the response of `{}`, this one follows as `{}` tells: plan it for this arm (--from plan)",
+                named(plan.arm_response.as_deref()),
+                named(follows)
+            );
+        }
         match shortcoming(plan) {
             Some(Shortcoming { message, is_severe }) if is_severe && !address.simulated => {
                 let plan = self.folder.file(files::PLAN);

@@ -200,6 +200,11 @@ impl Inputs {
         })
     }
 
+    /// Whether a simulated rig films.
+    pub const fn is_simulated(&self) -> bool {
+        self.rig_port.is_some()
+    }
+
     /// Refuses an arm that the camera does not film, or a controller in another domain.
     pub fn check_arm(&self, address: &ArmAddress) -> Outcome {
         if let Some(port) = self.rig_port {

@@ -27,7 +27,7 @@ use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use run_log::{RunRecord, files};
-use serde_json::Value;
+use serde_json::{Value, json};
 use session::Session;
 use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
 use shared_types::{OperatingMode, Task};
@@ -143,11 +143,16 @@ pub fn wiggle_alone(args: &WiggleArgs) -> Outcome<Option<Value>> {
 fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
     let target_m = args.target.map(|target| target.0);
     target_m.map_or(Ok(()), |target_m| check_target(target_m, settings))?;
+    args.out
+        .as_deref()
+        .map_or(Ok(()), RunFolder::refuse_existing)?;
     let limits = limits(&args.arm, None)?;
     let first = entry(args, settings)?;
     let Some((trajectory, operating_mode)) = first_motion(&first, &limits, settings)? else {
         println!("the throw is planned with the rope first, and checked then");
-        return Ok(None);
+        return Ok(Some(
+            json!({ "ok": true, "command": "run", "dry_run": true }),
+        ));
     };
     motion::check(None, &limits, &trajectory, operating_mode)?;
     let (name, _) = motion::words(operating_mode);
@@ -203,10 +208,7 @@ fn on_camera(
 ) -> Outcome<Option<Value>> {
     check_first(&entry, &address, &limits, &settings)?;
     let operator = operator(arm, &address)?;
-    // A throw that is still to be planned asks before its first move, minutes from now.
-    if !matches!(entry, Entry::Rope(_)) || arm.yes {
-        require_clear_area(arm, &address, "MOVE")?;
-    }
+    require_clear_area(arm, &address, "MOVE")?;
     watch_interrupts().or_failed()?;
     let mut folder = RunFolder::create(out, name)?;
     let service = address.service.as_ref().map(|s| &s.config.domain);
@@ -219,7 +221,12 @@ fn on_camera(
     let done = |session: &mut Session, record: &mut RunRecord| {
         let stage = Stage::begin("start");
         watch_operator(session, arm, &address)?;
-        let rig = session.find::<RigRpc>(&RigRequest::Ports)?;
+        // One that began since then was not compared with the arm.
+        let rig = if inputs.is_simulated() {
+            session.find::<RigRpc>(&RigRequest::Ports)?
+        } else {
+            None
+        };
         let told = rig.as_ref().map(|rig| Scene::of_rig(session, rig));
         let told = told.transpose()?;
         let of_file = inputs

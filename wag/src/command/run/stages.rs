@@ -183,7 +183,9 @@ impl<'a> Run<'a> {
             }
         };
         let throw = self.throw(&plan)?;
-        self.score();
+        if throw.frames > 0 {
+            self.score();
+        }
         self.compare_with_truth(&throw)?;
         self.record.ok = true;
         Ok(())
@@ -231,13 +233,15 @@ impl<'a> Run<'a> {
 
     /// Arms for a wiggle or a throw, which the operator confirms where somebody must.
     pub(super) fn arm_for(&mut self, operating_mode: OperatingMode) -> anyhow::Result<()> {
-        let confirmed_ns = if self.setup.asks {
-            self.session
-                .confirm(AT_START, motion::words(operating_mode).1)?
-        } else {
-            now_ns()
-        };
+        let word = motion::words(operating_mode).1;
+        let asked = self
+            .setup
+            .asks
+            .then(|| self.session.confirm(AT_START, word));
+        let confirmed_ns = asked.transpose()?;
         self.session.await_hold()?;
+        // A simulated arm is in nobody's way.
+        let confirmed_ns = confirmed_ns.unwrap_or_else(now_ns);
         pipeline::arm_for(self.session, &self.arm, operating_mode, Some(confirmed_ns))
     }
 
