@@ -7,6 +7,7 @@
 use crate::geometry::box_distance_m;
 use crate::joint::{JointState, JointVector};
 use crate::kinematics::{FrameMotion, flange_motion, flange_pose};
+use crate::task_bodies::{Board, StandingDomino, Wall};
 use crate::unit::unit_hint;
 use core::ops::RangeInclusive;
 use nalgebra::{Matrix3, Vector3};
@@ -16,7 +17,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// construction (m): it touches nothing.
 pub const CLAMPED_M: f64 = 0.05;
 /// Largest length of anything in a cell (m).
-const LENGTH_MAX_M: f64 = 10.0;
+pub(crate) const LENGTH_MAX_M: f64 = 10.0;
 
 /// The pole on the flange, along the flange's +z. The rope's first joint sits at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -45,6 +46,33 @@ pub struct Cell {
     pub column_half_width_m: f64,
     /// The pole on the flange.
     pub pole: Pole,
+    /// What a lob is thrown at.
+    #[cfg_attr(feature = "std", serde(default = "lab::board"))]
+    pub board: Board,
+    /// What stands on it.
+    #[cfg_attr(feature = "std", serde(default = "lab::domino"))]
+    pub domino: StandingDomino,
+    /// What a rope is draped over.
+    #[cfg_attr(feature = "std", serde(default = "lab::wall"))]
+    pub wall: Wall,
+}
+
+/// Bodies of a cell whose file is older than they are, or does without.
+#[cfg(feature = "std")]
+mod lab {
+    use super::{Board, Cell, StandingDomino, Wall};
+
+    pub(super) fn board() -> Board {
+        Cell::default().board
+    }
+
+    pub(super) fn domino() -> StandingDomino {
+        Cell::default().domino
+    }
+
+    pub(super) fn wall() -> Wall {
+        Cell::default().wall
+    }
 }
 
 fn checked<'de, D: Deserializer<'de>>(
@@ -62,7 +90,7 @@ fn checked<'de, D: Deserializer<'de>>(
     )))
 }
 
-fn length<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+pub(crate) fn length<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     let range = f64::MIN_POSITIVE..=LENGTH_MAX_M;
     checked(from, range, "not above 0 and at most 10 m")
 }

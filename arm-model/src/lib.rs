@@ -32,6 +32,7 @@ pub mod limits;
 pub mod piece;
 #[cfg(feature = "std")]
 pub mod response;
+pub mod task_bodies;
 pub mod trajectory;
 mod unit;
 

@@ -10,6 +10,7 @@ use rig_sim::RigConfig;
 use rt_controller::session::ArmSession;
 use rt_controller::xarm::{Command, Mode};
 use shared_types::StereoCamera;
+use shared_types::Task;
 use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, FrameHeader, IpcError};
@@ -126,7 +127,13 @@ fn frames_and_truth_of_a_rope_at_rest_agree() {
         let (from_ns, to_ns) = (frames[0].0.stamp_ns, frames[FRAMES - 1].0.stamp_ns);
         let request = RigRequest::Truth { from_ns, to_ns };
         assert!(matches!(ask(client, &request), RigEvent::Failed { .. }));
-        let placed = ask(client, &RigRequest::PlaceTarget { target_m });
+        let placed = ask(
+            client,
+            &RigRequest::PlaceTarget {
+                task: Task::Strike,
+                target_m,
+            },
+        );
         assert_eq!(placed, RigEvent::Done);
         let RigEvent::Truth {
             rope,

@@ -3,12 +3,13 @@
 
 use super::config::RigConfig;
 use super::error::RigError;
-use super::record::Record;
-use crate::render::{Renderer, RopeShape, ScenePose};
+use super::record::{Placed, Record};
+use crate::render::{Renderer, RopeShape, ScenePose, TaskBodies};
+use rope_sim::Scene;
 use shared_types::ipc::{
     Bus, FRAME_SERVICE, FrameHeader, FramePublisher, IpcError, PAYLOAD_VERSION, PIXEL_FORMAT_YUYV,
 };
-use shared_types::{MonotonicNs, StereoCamera};
+use shared_types::{MonotonicNs, StereoCamera, Task};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use xarm_sim::clock;
@@ -36,6 +37,7 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
         height_px: camera.height_px,
         ..FrameHeader::default()
     };
+    let mut drawn = None;
     while !stop.load(Ordering::Acquire) {
         let opens = shutter.opens();
         let arrives = opens.plus_s(config.camera.latency_s);
@@ -47,7 +49,12 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
             shutter.sequence += 1;
             continue;
         };
-        renderer.place_target(record.target_m());
+        let placed = record.placed();
+        if placed != drawn {
+            place(&mut renderer, config, placed);
+            drawn = placed;
+        }
+        renderer.lean_domino(record.tilt_rad());
         let header = FrameHeader {
             sequence: shutter.sequence,
             stamp_ns: opens.0,
@@ -57,6 +64,16 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
         shutter.next(clock::now(), config.camera.latency_s + BACKLOG_S);
     }
     Ok(())
+}
+
+/// Draws from now on what stands at the target.
+fn place(renderer: &mut Renderer, config: &RigConfig, placed: Option<Placed>) {
+    let ball = placed.filter(|(task, _)| *task == Task::Strike);
+    renderer.place_target(ball.map(|(_, target_m)| target_m));
+    renderer.place_bodies(placed.map(|(task, target_m)| {
+        let scene = Scene::of_task(task, target_m.into(), &config.cell);
+        TaskBodies::of(&scene, config.appearance().target_rgb)
+    }));
 }
 
 /// Draws the chosen room.

@@ -8,9 +8,14 @@ use crate::room::{Kind, Room, RopeSurface};
 use arm_model::joint::START_POSE;
 use arm_model::{Cell, JOINTS, JointVector, Limits};
 use serde::{Deserialize, Serialize};
-use shared_types::RopeParams;
+use shared_types::{RopeParams, Task};
 use std::net::IpAddr;
 use xarm_sim::{ArmConfig, FaultScript, Firmware, Intake, JointLag, Obstacle};
+
+/// Height (m) and upward tilt (rad) of a camera that looks down onto boards.
+const BOARD_CAMERA: (f64, f64) = (0.60, -0.30);
+/// How far in front of the arm a camera stands that sees both sides of walls (m).
+const WALL_CAMERA_X_M: f64 = 1.05;
 
 /// Rooms the rig may stand in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -104,6 +109,19 @@ impl Default for RigConfig {
 }
 
 impl RigConfig {
+    /// The same with a camera that sees what a task is thrown at: onto a board, and both sides
+    /// of a wall.
+    #[must_use]
+    pub fn seeing(mut self, task: Task) -> Self {
+        let camera = &mut self.camera;
+        match task {
+            Task::Strike => {}
+            Task::Lob => (camera.position_m[2], camera.tilt_up_rad) = BOARD_CAMERA,
+            Task::Drape => camera.position_m[0] = WALL_CAMERA_X_M,
+        }
+        self
+    }
+
     /// The rope on the pole.
     #[must_use]
     pub fn rope(&self) -> RopeParams {

@@ -33,6 +33,7 @@ pub use error::RigError;
 use nalgebra::Vector3;
 use record::Record;
 use service::Service;
+use shared_types::Task;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
@@ -60,7 +61,9 @@ pub fn run_announced(
     let service = Service::open(&config.domain)?;
     let rope = config.rope();
     let record = Record::default();
-    record.place_target(config.target_m.map(Vector3::from));
+    if let Some(target_m) = config.target_m {
+        record.want((Task::Strike, Vector3::from(target_m)));
+    }
     let arm = SimulatedArm::start(config.arm())?;
     let (history, ports) = (arm.history(), arm.ports());
     tracing::info!(command = ports.command, domain = %config.domain, "rig started");

@@ -2,9 +2,9 @@
 
 use super::contact::touches;
 use super::error::RigError;
-use super::record::{Record, Snapshot};
+use super::record::{Bodies, Placed, Record, Snapshot};
 use arm_model::{Cell, JointPiece, JointState};
-use rope_sim::LiveRope;
+use rope_sim::{LiveRope, Scene};
 use shared_types::{MonotonicNs, RopeParams};
 use std::sync::atomic::{AtomicBool, Ordering};
 use xarm_sim::{History, JointSample, clock};
@@ -36,6 +36,9 @@ pub(super) fn run(
             physics = Some(Physics::new(rope, cell, first)?);
         }
         if let Some(physics) = &mut physics {
+            if let Some(wanted) = record.wanted() {
+                record.placed_as(wanted, physics.place(wanted));
+            }
             let snapshots = rest.map(|sample| physics.follow(sample));
             record.extend(snapshots.collect::<Result<_, _>>()?);
         }
@@ -62,6 +65,14 @@ impl Physics {
             start: first.at,
             last: *first,
         })
+    }
+
+    /// Puts the bodies of a task around the rope.
+    fn place(&mut self, (task, target_m): Placed) -> Result<(), String> {
+        let scene = Scene::of_task(task, target_m.into(), &self.cell);
+        let attach = self.cell.pole.attach_motion(&self.last.state);
+        let placed = self.live.set_scene(&scene, &attach);
+        placed.map_err(|why| format!("the {} cannot stand there: {why}", task.name()))
     }
 
     /// Moves on to the next sample of the arm.
@@ -93,6 +104,11 @@ impl Physics {
         Ok(Snapshot {
             at: next.at,
             q: next.state.q,
+            bodies: Bodies {
+                tilt_rad: self.live.domino_tilt_rad().unwrap_or_default(),
+                is_down: self.live.domino().is_some_and(|d| d.down_at_s.is_some()),
+                touched: self.live.has_touched(0),
+            },
             touched: touches(&nodes, radii_m, &next.state.q, &self.cell),
             nodes,
         })

@@ -4,7 +4,8 @@
 use crate::render::ScenePose;
 use arm_model::JointVector;
 use nalgebra::Vector3;
-use shared_types::MonotonicNs;
+use shared_types::ipc::message::SeenThrow;
+use shared_types::{MonotonicNs, Task};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -22,29 +23,55 @@ pub(super) struct Snapshot {
     pub(super) nodes: Vec<Vector3<f64>>,
     /// Whether the rope touched arm or column.
     pub(super) touched: bool,
+    /// What it did with the bodies of a task.
+    pub(super) bodies: Bodies,
 }
+
+/// Bodies of a task at one instant.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Bodies {
+    /// Tilt of the domino (rad).
+    pub(super) tilt_rad: f64,
+    /// Whether it has fallen.
+    pub(super) is_down: bool,
+    /// Whether the rope has touched the first of them.
+    pub(super) touched: bool,
+}
+
+/// What a throw is for, and where.
+pub(super) type Placed = (Task, Vector3<f64>);
 
 #[derive(Debug, Clone, Copy)]
 struct Tip {
     at: MonotonicNs,
     p_w_m: Vector3<f64>,
+    middle_m: Vector3<f64>,
     touched: bool,
+    bodies: Bodies,
 }
 
 /// The truth about a span of time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Truth {
     pub(super) closest_m: f64,
     pub(super) closest_at: MonotonicNs,
     pub(super) peak_tip_speed_m_s: f64,
     pub(super) touched: bool,
+    pub(super) seen: SeenThrow,
 }
+
+/// Period of the places that the truth tells (s).
+const SEEN_PERIOD_S: f64 = 0.01;
 
 #[derive(Debug, Default)]
 struct Kept {
     ropes: VecDeque<Snapshot>,
     tips: VecDeque<Tip>,
-    target_m: Option<Vector3<f64>>,
+    placed: Option<Placed>,
+    /// What is to be placed, until physics has taken it.
+    wanted: Option<Placed>,
+    /// Why physics has not.
+    refused: Option<String>,
 }
 
 /// Shared between physics (writes), camera and service (read).
@@ -68,7 +95,9 @@ impl Record {
                 kept.tips.push_back(Tip {
                     at: snapshot.at,
                     p_w_m: *p,
+                    middle_m: middle(&snapshot.nodes),
                     touched: snapshot.touched,
+                    bodies: snapshot.bodies,
                 });
             }
             kept.ropes.push_back(snapshot);
@@ -81,12 +110,55 @@ impl Record {
         self.grown.notify_all();
     }
 
-    pub(super) fn place_target(&self, target_m: Option<Vector3<f64>>) {
-        self.kept().target_m = target_m;
+    /// Asks physics to place what a throw is for, and waits at most `patience` for it.
+    ///
+    /// # Errors
+    /// In words: the rope hangs where a body would be, or physics does not answer.
+    pub(super) fn place(&self, placed: Placed, patience: Duration) -> Result<(), String> {
+        self.want(placed);
+        let waits = |kept: &mut Kept| kept.wanted.is_some();
+        let (mut kept, _) = self
+            .grown
+            .wait_timeout_while(self.kept(), patience, waits)
+            .unwrap_or_else(PoisonError::into_inner);
+        if waits(&mut kept) {
+            return Err("the simulation does not answer; is the machine busy?".to_owned());
+        }
+        kept.refused.take().map_or(Ok(()), Err)
     }
 
-    pub(super) fn target_m(&self) -> Option<Vector3<f64>> {
-        self.kept().target_m
+    /// What physics is to place next.
+    pub(super) fn want(&self, placed: Placed) {
+        self.kept().wanted = Some(placed);
+    }
+
+    /// What is to be placed, if that is new.
+    pub(super) fn wanted(&self) -> Option<Placed> {
+        self.kept().wanted
+    }
+
+    /// Notes what became of what was wanted.
+    pub(super) fn placed_as(&self, placed: Placed, outcome: Result<(), String>) {
+        let mut kept = self.kept();
+        kept.wanted = None;
+        match outcome {
+            Ok(()) => kept.placed = Some(placed),
+            Err(why) => kept.refused = Some(why),
+        }
+        drop(kept);
+        self.grown.notify_all();
+    }
+
+    /// What stands at the target.
+    pub(super) fn placed(&self) -> Option<Placed> {
+        self.kept().placed
+    }
+
+    /// Tilt of the domino now (rad).
+    pub(super) fn tilt_rad(&self) -> f64 {
+        let kept = self.kept();
+        let bodies = kept.ropes.back().map(|newest| newest.bodies);
+        bodies.map_or(0.0, |bodies| bodies.tilt_rad)
     }
 
     /// Waits at most `patience` until physics has reached `at`; says whether.
@@ -131,8 +203,8 @@ impl Record {
     /// by 12 µm at most.
     pub(super) fn truth(&self, from: MonotonicNs, to: MonotonicNs) -> Result<Truth, String> {
         let kept = self.kept();
-        let target = kept
-            .target_m
+        let (_, target) = kept
+            .placed
             .ok_or("there is no target; place one before asking how close the tip came")?;
         let (Some(first), Some(last)) = (kept.tips.front(), kept.tips.back()) else {
             return Err("nothing has happened yet; ask again a little later".to_owned());
@@ -153,13 +225,40 @@ impl Record {
             closest_at: from,
             peak_tip_speed_m_s: 0.0,
             touched: false,
+            seen: SeenThrow::default(),
         };
         let next = kept.tips.range(begin + 1..end);
         for (a, b) in kept.tips.range(begin..end).zip(next) {
             truth.add(a, b, &target, (from, to));
         }
+        truth.seen = seen(kept.tips.range(begin..end), from);
         Ok(truth)
     }
+}
+
+/// Middle of a rope of equal links, by its arc length (m).
+fn middle(nodes: &[Vector3<f64>]) -> Vector3<f64> {
+    let links = nodes.len().saturating_sub(1);
+    let low = nodes.get(links / 2).copied().unwrap_or_default();
+    let high = nodes.get(links.div_ceil(2)).copied().unwrap_or_default();
+    (low + high) / 2.0
+}
+
+/// Where tip and middle were, every [`SEEN_PERIOD_S`], and what became of the bodies.
+fn seen<'a>(tips: impl Iterator<Item = &'a Tip>, from: MonotonicNs) -> SeenThrow {
+    let mut seen = SeenThrow::default();
+    for tip in tips {
+        let since_s = tip.at.since_s(from);
+        let due_s = SEEN_PERIOD_S * seen.tip.len() as f64;
+        if since_s >= due_s {
+            seen.tip.push((since_s, tip.p_w_m.into()));
+            seen.middle.push((since_s, tip.middle_m.into()));
+        }
+        seen.end_s = since_s;
+        seen.domino_down = Some(tip.bodies.is_down);
+        seen.touched = Some(tip.bodies.touched);
+    }
+    seen
 }
 
 impl Truth {
@@ -198,6 +297,10 @@ mod tests {
                 q: JointVector::splat(t_s),
                 nodes: vec![Vector3::zeros(), tip],
                 touched: ms == 1500,
+                bodies: Bodies {
+                    is_down: ms > 1000,
+                    ..Bodies::default()
+                },
             }
         });
         record.extend(snapshots.collect());
@@ -209,12 +312,17 @@ mod tests {
         let record = passing();
         let ask = |from, to| record.truth(MonotonicNs(from * MS), MonotonicNs(to * MS));
         assert!(ask(500, 1200).unwrap_err().contains("no target"));
-        record.place_target(Some(Vector3::x()));
+        record.placed_as((Task::Strike, Vector3::x()), Ok(()));
         let truth = ask(500, 1200).unwrap();
         assert!((truth.closest_m - 0.03).abs() < 1e-12);
         assert!(truth.closest_at.0.abs_diff(1_000_300_000) < 1_000);
         assert!((truth.peak_tip_speed_m_s - 5.0).abs() < 1e-9);
         assert!(!truth.touched);
+        assert_eq!(truth.seen.domino_down, Some(true));
+        assert_eq!(ask(500, 900).unwrap().seen.domino_down, Some(false));
+        let (since_s, [_, y_m, _]) = truth.seen.tip[40];
+        assert!((y_m - 5.0 * (0.5 + since_s - 1.000_3)).abs() < 1e-9);
+        assert!((truth.seen.middle[40].1[1] - y_m / 2.0).abs() < 1e-12);
         assert!(ask(500, 1600).unwrap().touched);
         // A span that ends early must not see what came later.
         let early = ask(500, 900).unwrap();

@@ -75,14 +75,16 @@ fn answer(request: &RigRequest, config: &RigConfig, ports: ArmPorts, record: &Re
             command: ports.command,
             reports: ports.reports,
         },
-        RigRequest::PlaceTarget { target_m } => {
+        RigRequest::PlaceTarget { task, target_m } => {
             if !target_m.iter().all(|v| v.abs() < 10.0) {
                 return RigEvent::Failed {
                     message: format!("target {target_m:?} does not lie within 10 m of the robot"),
                 };
             }
-            record.place_target(Some(Vector3::from(target_m)));
-            RigEvent::Done
+            match record.place((task, Vector3::from(target_m)), PATIENCE) {
+                Ok(()) => RigEvent::Done,
+                Err(message) => RigEvent::Failed { message },
+            }
         }
         RigRequest::Scene => {
             let colours = config.appearance();
@@ -101,6 +103,7 @@ fn answer(request: &RigRequest, config: &RigConfig, ports: ArmPorts, record: &Re
                     closest_ns: truth.closest_at.0,
                     peak_tip_speed_m_s: truth.peak_tip_speed_m_s,
                     touched: truth.touched,
+                    seen: Box::new(truth.seen),
                 },
                 Err(message) => RigEvent::Failed { message },
             }

@@ -55,5 +55,7 @@ pub use lanes::{Kernel, Precision};
 pub use live::LiveRope;
 pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};
 pub use rollout::{Candidate, Outcome, Rollout, SimOptions, Start, Sway};
-pub use scene::{ContactSummary, Domino, DominoOutcome, Obstacle, RopePart, Scene, Shape};
+pub use scene::{
+    ContactSummary, Domino, DominoOutcome, Obstacle, RopePart, Scene, Shape, TaskFrame,
+};
 pub use watch::{BoxRegion, ClosestApproach, Dwell, RestMeasures, Watch, Watched};

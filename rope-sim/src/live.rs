@@ -2,13 +2,16 @@
 
 use crate::algebra::Vec3;
 use crate::clock::BaseState;
-use crate::contact::{Node, predicted};
+use crate::contact::{
+    Contacts, LOOK_PERIOD, Node, Predicted, StepEnd, check_start, corrected, predicted,
+};
 use crate::equilibrium::hanging_links;
 use crate::error::{SimulateError, refuse_unless_positive};
 use crate::extra_loads::ExtraLanes;
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes, run_scalar};
 use crate::load::{LinkLoads, Unloaded};
+use crate::scene::{DominoOutcome, Scene};
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{Link, RopeLanes};
 use arm_model::kinematics::FrameMotion;
@@ -30,28 +33,38 @@ pub struct LiveRope {
     step_s: f64,
     time_s: f64,
     nodes: Vec<Vector3<f64>>,
-    /// What the rope has beyond its nine parameters.
-    extras: Option<Extras>,
+    /// What the rope has beyond its nine parameters, and what it can touch.
+    surroundings: Option<Surroundings>,
 }
 
-/// Extras with the loads of the current step.
+/// Extras and obstacles, with the loads of the current step.
 #[derive(Clone)]
-struct Extras {
-    lanes: ExtraLanes<f64>,
+struct Surroundings {
+    extras: ExtraLanes<f64>,
+    contacts: Option<Contacts<f64>>,
     loads: LinkLoads<f64>,
     nodes: Vec<Node<f64>>,
+    /// Steps until the next look at how far everything is.
+    unseen: usize,
 }
 
-impl Extras {
+impl Surroundings {
     fn of(rope: &RopeParams, links: &[Link<f64>], attach: &FrameMotion) -> Self {
         let mut loads = LinkLoads::new(links.len());
-        let mut lanes = ExtraLanes::new(&[rope], &mut loads);
-        lanes.start(links, &BaseState::of(attach).dynamics);
+        let mut extras = ExtraLanes::new(&[rope], &mut loads);
+        extras.start(links, &BaseState::of(attach).dynamics);
         Self {
-            lanes,
+            extras,
+            contacts: None,
             loads,
             nodes: vec![Node::zero(); links.len()],
+            unseen: 0,
         }
+    }
+
+    /// Whether the rope is about to touch something.
+    fn is_imminent(&self) -> bool {
+        self.contacts.as_ref().is_some_and(|c| c.imminent > 0.0)
     }
 }
 
@@ -88,10 +101,10 @@ impl LiveRope {
             links.push(link);
         }
         let n = links.len();
-        let extras = rope
+        let surroundings = rope
             .extras
             .is_some()
-            .then(|| Extras::of(rope, &links, attach));
+            .then(|| Surroundings::of(rope, &links, attach));
         let mut live = Self {
             rope: RopeLanes::of(rope),
             params: *rope,
@@ -103,10 +116,54 @@ impl LiveRope {
             step_s: 0.0,
             time_s: 0.0,
             nodes: vec![Vector3::zeros(); n + 1],
-            extras,
+            surroundings,
         };
         live.place_nodes(&attach.p_m);
         Ok(live)
+    }
+
+    /// Puts a scene around the rope, in place of what was there; a domino of it stands.
+    /// `attach` is the frame from which the rope hangs now.
+    ///
+    /// # Errors
+    /// The rope is inside a body of it; the rope is as before then.
+    pub fn set_scene(&mut self, scene: &Scene, attach: &FrameMotion) -> Result<(), SimulateError> {
+        let attitude = |link: &Link<f64>| [link.q.w, link.q.v.0, link.q.v.1, link.q.v.2];
+        let attitudes: Vec<_> = self.links.iter().map(attitude).collect();
+        check_start(scene, &self.params, &attach.p_m, &attitudes)
+            .map_err(|why| SimulateError::of(0, why))?;
+        let surroundings = self
+            .surroundings
+            .get_or_insert_with(|| Surroundings::of(&self.params, &self.links, attach));
+        let ropes = [&self.params];
+        surroundings.contacts =
+            (!scene.is_empty()).then(|| Contacts::new(scene, &ropes, self.max_step_s, [0.0; 3]));
+        surroundings.unseen = 0;
+        Ok(())
+    }
+
+    /// What became of the scene's domino; `None` without one.
+    #[must_use]
+    pub fn domino(&self) -> Option<DominoOutcome> {
+        self.surroundings.as_ref()?.contacts.as_ref()?.domino_of(0)
+    }
+
+    /// Its tilt now (rad), as [`DominoOutcome::peak_tilt_rad`] is counted.
+    #[must_use]
+    pub fn domino_tilt_rad(&self) -> Option<f64> {
+        self.surroundings
+            .as_ref()?
+            .contacts
+            .as_ref()?
+            .tilt_rad_of(0)
+    }
+
+    /// Whether the rope has touched an obstacle of the scene, by its index.
+    #[must_use]
+    pub fn has_touched(&self, obstacle: usize) -> bool {
+        let contacts = self.surroundings.as_ref().and_then(|s| s.contacts.as_ref());
+        let touched = contacts.map(|c| c.summaries_of(0));
+        touched.is_some_and(|t| t.get(obstacle).is_some_and(|o| o.touched()))
     }
 
     /// Advances to `to_t_s` in equal steps, reading the attach frame's motion at the
@@ -155,30 +212,67 @@ impl LiveRope {
     }
 
     #[inline(always)]
-    fn step(&mut self, attach: &BaseState<f64>) {
+    fn step(&mut self, attach: &BaseState<f64>, end: StepEnd) {
         let (links, scratch, rope) = (&mut self.links, &mut self.scratch, &self.rope);
         let (base, scheme) = (&attach.dynamics, &self.scheme);
-        let Some(Extras {
-            lanes,
+        let Some(Surroundings {
+            extras,
+            contacts,
             loads,
             nodes,
-        }) = &mut self.extras
+            unseen,
+        }) = &mut self.surroundings
         else {
             step(links, scratch, rope, base, scheme, &Unloaded);
             return;
         };
+        if let Some(contacts) = contacts {
+            if *unseen == 0 {
+                corrected(nodes, links, rope, attach);
+                contacts.look(nodes, rope);
+                *unseen = LOOK_PERIOD;
+            }
+            *unseen -= 1;
+        }
+        let mut engaged = contacts.as_mut().filter(|contacts| contacts.is_engaged());
+        if engaged.is_none() && !extras.is_any() {
+            step(links, scratch, rope, base, scheme, &Unloaded);
+            return;
+        }
         for link in links.iter_mut() {
             link.predict(scheme);
         }
         predicted(nodes, links, rope, attach, scheme);
         loads.clear();
-        lanes.load(loads, links, nodes, rope, base, scheme);
+        extras.load(loads, links, nodes, rope, base, scheme);
+        if let Some(contacts) = &mut engaged {
+            let attach = attach.position;
+            contacts.load(
+                loads,
+                Predicted {
+                    links,
+                    nodes,
+                    attach,
+                    scheme,
+                },
+            );
+        }
         step(links, scratch, rope, base, scheme, loads);
-        lanes.settle(links, base, scheme);
+        extras.settle(links, base, scheme);
+        if let Some(contacts) = engaged {
+            corrected(nodes, links, rope, attach);
+            contacts.settle(links, nodes, scheme, &[end]);
+        }
     }
 
+    /// A rope that is about to touch something restarts at every step, see [`Contacts`].
     fn set_step(&mut self, step_s: f64) {
+        let touches = self
+            .surroundings
+            .as_ref()
+            .is_some_and(Surroundings::is_imminent);
         let phase = match self.phase {
+            _ if touches => Phase::Restart,
             None => Phase::Restart,
             Some(Phase::Restart) => Phase::AfterRestart,
             Some(_) => Phase::Regular,
@@ -188,6 +282,11 @@ impl LiveRope {
             let resistance = joint_resistance(step_s, phase, &self.params);
             self.rope.set(0, &self.params, resistance);
             (self.phase, self.step_s) = (Some(phase), step_s);
+        }
+        if phase == Phase::Restart {
+            self.links
+                .iter_mut()
+                .for_each(|link| link.clear_memory(1.0));
         }
     }
 }
@@ -216,7 +315,12 @@ impl LaneTask for Advance<'_> {
             done += 1.0;
             live.set_step(step_s);
             let time_s = from_s + span_s * (done / steps);
-            live.step(&BaseState::of(&(self.motion)(time_s)));
+            let end = StepEnd {
+                time_s,
+                step_s,
+                running: true,
+            };
+            live.step(&BaseState::of(&(self.motion)(time_s)), end);
         }
     }
 }

@@ -5,7 +5,7 @@ use anyhow::bail;
 use serde::Serialize;
 use serde_json::{Value, json};
 use shared_types::ipc::message::{LatencyReport, RigEvent, RopeAppearance, ScoreResult};
-use shared_types::{Plan, RopeEstimate, RopeParams};
+use shared_types::{Plan, RopeEstimate, RopeParams, Task, Verdict};
 use std::path::Path;
 
 /// When a motion ran (CLOCK_MONOTONIC, ns).
@@ -91,7 +91,8 @@ pub struct RunRecord {
     pub seed: u64,
     /// The run's folder.
     pub run: String,
-    task: &'static str,
+    /// What the throw is for.
+    pub task: Task,
     /// Target in the arm's base frame (m); none of a wiggle alone.
     pub target_m: Option<[f64; 3]>,
     /// What went wrong.
@@ -123,6 +124,10 @@ pub struct RunRecord {
     pub arm_lag_s: Option<f64>,
     /// The throw as the camera measured it.
     pub score: Option<ScoreResult>,
+    /// Whether a lob or drape succeeded, as the camera saw it.
+    pub camera_verdict: Option<Verdict>,
+    /// The same by the rig's truth.
+    pub true_verdict: Option<Verdict>,
     /// Why it could not.
     pub score_failed: Option<String>,
     /// Latency of the control loop during the throw.
@@ -151,7 +156,7 @@ impl RunRecord {
     pub fn new(
         command: &'static str,
         seed: u64,
-        target_m: Option<[f64; 3]>,
+        (task, target_m): (Task, Option<[f64; 3]>),
         folder: &Path,
     ) -> Self {
         Self {
@@ -159,7 +164,7 @@ impl RunRecord {
             version: shared_types::VERSION,
             seed,
             run: folder.display().to_string(),
-            task: "strike",
+            task,
             target_m,
             ..Self::default()
         }

@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 /// What the throw is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "snake_case")]
 pub enum Task {
     /// The tip passes through the target.
+    #[default]
     Strike,
     /// The tip fells a domino on a board and comes to lie there.
     Lob,
@@ -49,6 +50,22 @@ pub struct Verdict {
     pub success: bool,
     /// Its conditions, in the task's order.
     pub conditions: Vec<Condition>,
+}
+
+impl core::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let named = |met: bool| {
+            let conditions = self.conditions.iter().filter(|c| c.met == met);
+            conditions
+                .map(|c| c.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", ")
+        };
+        match self.success {
+            true => write!(f, "succeeded ({})", named(true)),
+            false => write!(f, "failed (not met: {})", named(false)),
+        }
+    }
 }
 
 /// What keeps a plan from being better.

@@ -108,6 +108,10 @@ impl Process {
                 let scored = work::score(&mut self.recording, &call);
                 return answer(&call, &scored.unwrap_or_else(failed));
             }
+            CameraRequest::Look { .. } => {
+                let seen = work::look(&mut self.recording, &call);
+                return answer(&call, &seen.unwrap_or_else(failed));
+            }
             CameraRequest::WaitStill { timeout_s } => Waiting::Still {
                 detector: StillDetector::new(STILL_LAG_FRAMES, STILL_FRAMES),
                 until: now + Duration::from_secs_f64(timeout_s.clamp(0.0, 600.0)),

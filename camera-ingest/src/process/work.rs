@@ -139,6 +139,33 @@ pub(super) fn score(
     Ok(CameraEvent::Scored((&found).into()))
 }
 
+/// Tells where the tip is in a throw after which it comes to rest.
+pub(super) fn look(
+    recording: &mut Recording,
+    call: &Call<CameraRpc>,
+) -> Result<CameraEvent, Failure> {
+    let CameraRequest::Look {
+        camera,
+        tip_rgb,
+        domino,
+        from_ns,
+        strobe: picture,
+    } = &call.request
+    else {
+        return Err("not a request to look".into());
+    };
+    if !recording.has_both() {
+        return Err("nothing is recorded to look at; record first, both images".into());
+    }
+    let seen = crate::score::look(recording, camera, *tip_rgb, domino.as_ref(), *from_ns);
+    let drawn = picture.as_ref().map_or(Ok(()), |path| {
+        write_strobe(recording, None, Path::new(path))
+    });
+    let seen = seen?;
+    drawn?;
+    Ok(CameraEvent::Seen(seen))
+}
+
 /// A multiple exposure of the throw up to a little after the closest approach,
 /// on the scene behind what moves.
 fn write_strobe(

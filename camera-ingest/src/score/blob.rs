@@ -172,7 +172,7 @@ impl BlobMap {
 }
 
 /// Coverage of one sample, 0 where its chroma points elsewhere.
-fn coverage(seen: Chroma, empty: Chroma, wanted: Chroma) -> f64 {
+pub(super) fn coverage(seen: Chroma, empty: Chroma, wanted: Chroma) -> f64 {
     let d = [seen[0] - empty[0], seen[1] - empty[1]];
     let t = [wanted[0] - empty[0], wanted[1] - empty[1]];
     let (dot, tt) = (d[0] * t[0] + d[1] * t[1], t[0] * t[0] + t[1] * t[1]);

@@ -8,6 +8,7 @@
 mod blob;
 mod error;
 mod path;
+mod rest;
 mod scene;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,7 @@ use shared_types::ipc::message::ScoreResult;
 use crate::calib::extrinsics::Correspondence;
 use crate::source::StereoSource;
 pub use error::ScoreError;
+pub use rest::look;
 
 /// Result of one throw.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -91,7 +93,7 @@ pub fn score(
         end_s = since_s;
         let near = detections.last().copied();
         let images = [&frame.left(), &frame.right()];
-        if let Some(tip) = scene.tip(images, tip_rgb, &target, near, since_s) {
+        if let Some(tip) = scene.tip(images, tip_rgb, Some(&target), near, since_s) {
             detections.push(tip);
         }
     }

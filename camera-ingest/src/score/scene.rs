@@ -21,9 +21,9 @@ const DEPTH_M: [f64; 2] = [0.25, 5.0];
 /// The still scene of both images.
 pub(super) struct Scene<'a> {
     camera: &'a StereoCamera,
-    images: [ImageFrame; 2],
+    pub(super) images: [ImageFrame; 2],
     /// What most of each image's scene looks like.
-    middles: [Chroma; 2],
+    pub(super) middles: [Chroma; 2],
 }
 
 /// A pair of blobs that can be one thing.
@@ -94,8 +94,17 @@ impl<'a> Scene<'a> {
         camera: &'a StereoCamera,
     ) -> Result<Self, ScoreError> {
         let chosen = crate::track::spread(source.len(), BACKGROUND_FRAMES);
+        Self::of_frames(source, camera, &chosen)
+    }
+
+    /// The scene as the median of these frames.
+    pub(super) fn of_frames(
+        source: &mut dyn StereoSource,
+        camera: &'a StereoCamera,
+        chosen: &[usize],
+    ) -> Result<Self, ScoreError> {
         let (mut left, mut right) = (Vec::new(), Vec::new());
-        for &index in &chosen {
+        for &index in chosen {
             let frame = read_sized(source, index, camera)?;
             left.push(frame.left());
             right.push(frame.right());
@@ -182,7 +191,7 @@ impl<'a> Scene<'a> {
         &self,
         images: [&ImageFrame; 2],
         rgb: [u8; 3],
-        target: &Target,
+        target: Option<&Target>,
         before: Option<Detection>,
         since_s: f64,
     ) -> Option<Detection> {
@@ -208,7 +217,7 @@ impl<'a> Scene<'a> {
             radius_px: (pair.left.area_px / std::f64::consts::PI).sqrt(),
             spread: 1.0,
         };
-        if target.touches(&pair) {
+        if target.is_some_and(|target| target.touches(&pair)) {
             detection.cut();
         }
         Some(detection)

@@ -3,6 +3,7 @@
 use super::arm::{ArmShape, Part};
 use arm_model::geometry::{Capsule, box_distance_m};
 use nalgebra::Isometry3;
+use rope_sim::{Obstacle, Shape};
 
 /// Distance below which arm and block count as touching: what an arm's pose and a
 /// scene are not known to (m).
@@ -20,6 +21,23 @@ pub struct Block {
 }
 
 impl Block {
+    /// The box around a body of a scene; none around a half space, which is the floor.
+    #[must_use]
+    pub fn around(obstacle: &Obstacle) -> Option<Self> {
+        let half_m = match obstacle.shape {
+            Shape::HalfSpace => return None,
+            Shape::Box { half_m } => half_m,
+            Shape::Cylinder {
+                half_length_m,
+                radius_m,
+            } => [radius_m, radius_m, half_length_m],
+        };
+        Some(Self {
+            pose: obstacle.pose,
+            half_m,
+        })
+    }
+
     /// Gap between the block and a capsule (m); negative when they overlap.
     #[must_use]
     pub fn gap_m(&self, capsule: &Capsule) -> f64 {

@@ -5,19 +5,14 @@
 //! the end: its middle on the edge, its tip below it on the far side, at rest.
 
 use super::pole_pose::PolePose;
-use super::scene::PlanarScene;
 use super::{ThrowConfig, ThrowOutcome, ThrowTask, verdict};
 use crate::OutOfRange;
-use crate::collide::Block;
 use arm_model::Cell;
 use nalgebra::Vector3;
-use rope_sim::{BoxRegion, Obstacle, Scene, Watch};
+use rope_sim::{BoxRegion, Scene, TaskFrame, Watch};
 use serde::{Deserialize, Serialize};
-use shared_types::{RopeParams, Verdict};
+use shared_types::{RopeParams, Task, Verdict};
 
-/// Edges of the wall, outwards, across and down (m).
-const WALL_M: [f64; 3] = [0.02, 0.60, 0.40];
-const WALL_FRICTION: f64 = 0.5;
 /// Time before the end in which the rope must rest (s).
 const REST_S: f64 = 1.0;
 /// Movements allowed in it: of the tip's height, and of the rope's middle (m).
@@ -99,13 +94,13 @@ pub struct Drape {
 const UNKNOWN_M: f64 = 1.0;
 
 impl Drape {
-    fn place(&self) -> PlanarScene {
-        PlanarScene::at(self.target_m)
+    fn place(&self) -> TaskFrame {
+        TaskFrame::at(self.target_m)
     }
 
     /// Where the tip hangs when the rope's middle is on the edge (m).
-    fn hanging(&self, rope: &RopeParams) -> [f64; 3] {
-        let beyond = WALL_M[0] / 2.0 + rope.lead_radius_m;
+    fn hanging(&self, rope: &RopeParams, cell: &Cell) -> [f64; 3] {
+        let beyond = cell.wall.size_m[0] / 2.0 + rope.lead_radius_m;
         self.place().point([beyond, 0.0, -rope.length_m / 2.0])
     }
 
@@ -148,25 +143,19 @@ impl ThrowTask for Drape {
     }
 
     fn scene(&self, cell: &Cell) -> Scene {
-        Scene::with(vec![
-            self.place().box_below([0.0; 3], WALL_M, WALL_FRICTION),
-            Obstacle::floor(cell.floor_z_m, WALL_FRICTION),
-        ])
+        Scene::of_task(Task::Drape, self.target_m, cell)
     }
 
-    fn keep_clear(&self, _: &Cell) -> Vec<Block> {
-        vec![self.place().block_below([0.0; 3], WALL_M)]
-    }
-
-    fn watch(&self, rope: &RopeParams) -> Watch {
+    fn watch(&self, rope: &RopeParams, cell: &Cell) -> Watch {
         let place = self.place();
-        let hanging = self.hanging(rope);
+        let hanging = self.hanging(rope, cell);
+        let [thickness_m, width_m, _] = cell.wall.size_m;
         Watch {
             point_m: Some(place.point([0.0, 0.0, PASS_ABOVE_M])),
             segment_m: Some([hanging, hanging]),
             dwell_in: Some(BoxRegion {
-                center_m: place.point([WALL_M[0] / 2.0 + FAR_M, 0.0, 0.0]),
-                half_m: [FAR_M, WALL_M[1] / 2.0, FAR_M],
+                center_m: place.point([thickness_m / 2.0 + FAR_M, 0.0, 0.0]),
+                half_m: [FAR_M, width_m / 2.0, FAR_M],
                 yaw_rad: place.bearing_rad,
             }),
             height: true,
@@ -185,14 +174,14 @@ impl ThrowTask for Drape {
         PolePose::beside(self.target_m, poses).into()
     }
 
-    fn fitness(&self, rope: &RopeParams, outcome: &ThrowOutcome) -> f64 {
+    fn fitness(&self, _: &RopeParams, outcome: &ThrowOutcome) -> f64 {
         let c = &self.config;
         let watched = &outcome.watched;
         let hang_m = watched.to_segment.map_or(UNKNOWN_M, |s| s.distance_m);
         let highest_m = watched.highest_m.unwrap_or(0.0);
         let arc_m = (highest_m - self.target_m[2] - c.arc_height_m).max(0.0);
         let (tip_m, moving_m) = watched.rest.map_or((UNKNOWN_M, UNKNOWN_M), |r| {
-            let hanging = Vector3::from(self.hanging(rope));
+            let hanging = Vector3::from(outcome.segment_m[0]);
             (
                 (Vector3::from(r.tip_m) - hanging).norm(),
                 r.tip_height_spread_m + r.middle_movement_m,

@@ -6,27 +6,14 @@
 //! near the target it lies then, which is what leaves room for an error of the rope.
 
 use super::pole_pose::PolePose;
-use super::scene::PlanarScene;
 use super::{Robustness, ThrowConfig, ThrowOutcome, ThrowTask, proximity_reward, verdict};
 use crate::OutOfRange;
-use crate::collide::Block;
 use arm_model::Cell;
 use nalgebra::Vector3;
-use rope_sim::{BoxRegion, Domino, Obstacle, Scene, Watch};
+use rope_sim::{BoxRegion, Scene, TaskFrame, Watch};
 use serde::{Deserialize, Serialize};
-use shared_types::{RopeParams, Verdict};
+use shared_types::{RopeParams, Task, Verdict};
 
-/// Edges of the board, outwards, across and down (m).
-const BOARD_M: [f64; 3] = [0.30, 0.40, 0.01];
-const BOARD_FRICTION: f64 = 0.6;
-/// Radius of the column that carries it (m).
-const COLUMN_RADIUS_M: f64 = 0.02;
-/// How much closer to the robot than the target the domino stands (m).
-const DOMINO_BEFORE_M: f64 = 0.06;
-/// Edges of the domino: thickness, width, height (m), and its mass (kg).
-const DOMINO_M: [f64; 3] = [0.008, 0.025, 0.050];
-const DOMINO_KG: f64 = 0.010;
-const DOMINO_FRICTION: f64 = 0.4;
 /// Height above the board, less the lead's radius, up to which the tip lies on it (m).
 const LIES_BELOW_M: f64 = 0.05;
 /// Time for which it must lie there (s).
@@ -100,13 +87,8 @@ pub struct Lob {
 }
 
 impl Lob {
-    fn place(&self) -> PlanarScene {
-        PlanarScene::at(self.target_m)
-    }
-
-    /// Height of the column below the board (m).
-    fn column_m(&self, cell: &Cell) -> f64 {
-        (self.target_m[2] - BOARD_M[2] - cell.floor_z_m).max(0.01)
+    fn place(&self) -> TaskFrame {
+        TaskFrame::at(self.target_m)
     }
 
     /// How long the tip has lain on the board when the simulation ends (s).
@@ -133,53 +115,23 @@ impl ThrowTask for Lob {
     }
 
     fn scene(&self, cell: &Cell) -> Scene {
-        let place = self.place();
-        Scene {
-            obstacles: vec![
-                place.box_below([0.0, 0.0, 0.0], BOARD_M, BOARD_FRICTION),
-                Obstacle::column_below(
-                    place.point([0.0, 0.0, -BOARD_M[2]]),
-                    COLUMN_RADIUS_M,
-                    self.column_m(cell),
-                    BOARD_FRICTION,
-                ),
-                Obstacle::floor(cell.floor_z_m, BOARD_FRICTION),
-            ],
-            domino: Some(Domino {
-                foot_m: place.point([-DOMINO_BEFORE_M, 0.0, 0.0]),
-                facing_rad: place.bearing_rad,
-                thickness_m: DOMINO_M[0],
-                width_m: DOMINO_M[1],
-                height_m: DOMINO_M[2],
-                mass_kg: DOMINO_KG,
-                friction: DOMINO_FRICTION,
-            }),
-        }
+        Scene::of_task(Task::Lob, self.target_m, cell)
     }
 
-    fn keep_clear(&self, cell: &Cell) -> Vec<Block> {
+    fn watch(&self, rope: &RopeParams, cell: &Cell) -> Watch {
         let place = self.place();
-        let width_m = 2.0 * COLUMN_RADIUS_M;
-        let column = [width_m, width_m, self.column_m(cell)];
-        vec![
-            place.block_below([0.0, 0.0, 0.0], BOARD_M),
-            place.block_below([0.0, 0.0, -BOARD_M[2]], column),
-        ]
-    }
-
-    fn watch(&self, rope: &RopeParams) -> Watch {
-        let place = self.place();
+        let [board_x_m, board_y_m, _] = cell.board.size_m;
         let r = rope.lead_radius_m;
         let height_m = LIES_BELOW_M + r;
         Watch {
             point_m: Some(place.point([0.0, 0.0, r])),
             segment_m: Some([
-                place.point([-DOMINO_BEFORE_M, 0.0, r]),
+                place.point([-cell.domino.before_target_m, 0.0, r]),
                 place.point([0.0, 0.0, r]),
             ]),
             dwell_in: Some(BoxRegion {
                 center_m: place.point([0.0, 0.0, height_m / 2.0]),
-                half_m: [BOARD_M[0] / 2.0, BOARD_M[1] / 2.0, height_m / 2.0],
+                half_m: [board_x_m / 2.0, board_y_m / 2.0, height_m / 2.0],
                 yaw_rad: place.bearing_rad,
             }),
             rest_window_s: Some(STAY_S),

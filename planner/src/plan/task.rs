@@ -22,13 +22,8 @@ pub trait ThrowTask: Sync {
         Scene::EMPTY
     }
 
-    /// What arm and pole must not touch.
-    fn keep_clear(&self, _cell: &Cell) -> Vec<Block> {
-        Vec::new()
-    }
-
     /// What is measured in the simulation; [`Watch::point_m`] must be among it.
-    fn watch(&self, _rope: &RopeParams) -> Watch {
+    fn watch(&self, _rope: &RopeParams, _cell: &Cell) -> Watch {
         Watch::point(self.target_m())
     }
 
@@ -85,10 +80,11 @@ pub fn simulator_for(
     options: &PlanOptions,
 ) -> ThrowSimulator {
     let config = task.config();
+    let scene = task.scene(cell);
     ThrowSimulator {
-        watch: task.watch(rope),
-        scene: task.scene(cell),
-        keep_clear: task.keep_clear(cell),
+        watch: task.watch(rope, cell),
+        keep_clear: scene.obstacles.iter().filter_map(Block::around).collect(),
+        scene,
         // Longer throws than these times are among the candidates of free times only.
         motion_s_min: config.waypoint_times_s[WAYPOINTS - 1] * options.segment_stretch_max,
         tail_s: config.tail_s,

@@ -290,7 +290,7 @@ fn warm_starts_are_executable_at_any_bearing() {
         let setup = Setup::new(task, &r).unwrap();
         assert_ne!(setup.start, setup.space.resting(), "{kind:?}");
         assert!(setup.screen.accepts(&setup.start), "{kind:?}");
-        let first = task.keep_clear(&r.cell)[0].pose.translation.vector;
+        let first = task.scene(&r.cell).obstacles[0].pose.translation.vector;
         assert_eq!(first.y.signum(), target_m[1].signum());
     }
 }

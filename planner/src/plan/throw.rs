@@ -36,6 +36,8 @@ pub struct ThrowOutcome {
     pub end_s: f64,
     /// The watched point (m).
     pub point_m: [f64; 3],
+    /// Ends of the watched segment (m).
+    pub segment_m: [[f64; 3]; 2],
 }
 
 /// How throws of one task are simulated.
@@ -180,6 +182,7 @@ impl ThrowSimulator {
             domino: rollout.domino,
             end_s,
             point_m: self.watch.point_m.unwrap_or_default(),
+            segment_m: self.watch.segment_m.unwrap_or_default(),
         }
     }
 }

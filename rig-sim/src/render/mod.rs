@@ -34,6 +34,7 @@ mod shadows;
 mod shutter;
 pub(crate) mod solid;
 mod stroke;
+mod task_bodies;
 pub(crate) mod texture;
 pub(crate) mod weave;
 
@@ -41,3 +42,4 @@ pub use appearance::Appearance;
 pub(crate) use bodies::centreline;
 pub use bodies::{RopeShape, ScenePose};
 pub use scene::Renderer;
+pub use task_bodies::TaskBodies;

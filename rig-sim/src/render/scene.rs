@@ -9,6 +9,7 @@ use super::lamp_view::LampView;
 use super::sensor::{Sensor, brighten};
 use super::shadows::Shadows;
 use super::shutter::RowTimes;
+use super::task_bodies::TaskBodies;
 use crate::room::bystander::Bystanders;
 use crate::room::{Picture, Room};
 use arm_model::Cell;
@@ -32,6 +33,9 @@ pub struct Renderer {
     sensor: Sensor,
     rows: RowTimes,
     target_m: Option<Vector3<f64>>,
+    bodies: Option<TaskBodies>,
+    /// Tilt of their domino (rad).
+    tilt_rad: f64,
     shadows: Shadows,
     /// What moves in a drawn room by itself.
     bystanders: Bystanders,
@@ -109,6 +113,8 @@ impl Renderer {
             sensor: Sensor::new(noise_levels, row_bytes, seed),
             rows: RowTimes::of(camera),
             target_m: None,
+            bodies: None,
+            tilt_rad: 0.0,
             shadows: Shadows::of(lamps),
             bystanders: Bystanders::default(),
             picture: None,
@@ -133,6 +139,16 @@ impl Renderer {
     /// Puts the target ball at a place in the world (m), or takes it away.
     pub fn place_target(&mut self, target_m: Option<Vector3<f64>>) {
         self.target_m = target_m;
+    }
+
+    /// Puts the bodies of a task into the scene, or takes them away.
+    pub fn place_bodies(&mut self, bodies: Option<TaskBodies>) {
+        self.bodies = bodies;
+    }
+
+    /// Leans their domino (rad).
+    pub fn lean_domino(&mut self, tilt_rad: f64) {
+        self.tilt_rad = tilt_rad;
     }
 
     /// Sub-frames that show the motion from `start` to `end` of a frame, from the first
@@ -162,6 +178,9 @@ impl Renderer {
         let mut others = self.bystanders.at(begins_s);
         if let Some(at) = &self.target_m {
             others.extend(target_solids(&self.cell, at, &self.appearance));
+        }
+        if let Some(bodies) = &self.bodies {
+            others.extend(bodies.solids(self.tilt_rad));
         }
         let cast = Cast {
             cell: &self.cell,

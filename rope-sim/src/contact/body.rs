@@ -67,6 +67,7 @@ pub(crate) fn constant<V: Lanes>(v: &Vector3<f64>) -> Vec3<V> {
 }
 
 /// One obstacle.
+#[derive(Clone)]
 pub(crate) struct Body<V> {
     pub(crate) shape: Shape,
     pub(crate) friction: V,

@@ -42,6 +42,7 @@ const REACH_STEPS: f64 = 4.0;
 const POINTS: usize = 2;
 
 /// All contacts of a group of ropes.
+#[derive(Clone)]
 pub(crate) struct Contacts<V> {
     bodies: Vec<Body<V>>,
     /// By body, link, point.
@@ -145,6 +146,11 @@ impl<V: Lanes> Contacts<V> {
         let obstacles = self.bodies.len() - usize::from(self.domino.is_some());
         let of_obstacles = self.summaries.iter().take(obstacles);
         of_obstacles.map(|by_lane| by_lane[lane]).collect()
+    }
+
+    /// Tilt of one lane's domino (rad).
+    pub(crate) fn tilt_rad_of(&self, lane: usize) -> Option<f64> {
+        self.domino.as_ref().map(|d| d.tilt_rad(lane))
     }
 
     /// What became of one lane's domino.

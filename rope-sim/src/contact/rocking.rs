@@ -18,6 +18,7 @@ use core::f64::consts::FRAC_PI_4;
 use nalgebra::Vector3;
 
 /// Pose and pushes of every lane's domino.
+#[derive(Clone)]
 pub(crate) struct RockingBlocks<V> {
     domino: Domino,
     foot: Vec3<V>,
@@ -191,6 +192,11 @@ impl<V: Lanes> RockingBlocks<V> {
         self.contacts = self.counted.max(V::splat(1.0));
         self.counted = V::splat(0.0);
         self.moments = [V::splat(0.0); 2];
+    }
+
+    /// Tilt of one lane's (rad); it is no longer followed beyond 45 degrees.
+    pub(crate) fn tilt_rad(&self, lane: usize) -> f64 {
+        self.lanes.get(lane).map_or(0.0, |t| t.angle_rad)
     }
 
     /// What became of one lane's.

@@ -1,6 +1,9 @@
 //! What a rope may touch, and what a rollout says about touching.
 
 mod check;
+mod task;
+
+pub use task::TaskFrame;
 
 use nalgebra::Isometry3;
 

@@ -22,6 +22,20 @@ pub struct BoxRegion {
     pub yaw_rad: f64,
 }
 
+impl BoxRegion {
+    /// Whether a point (m, world) is inside.
+    #[must_use]
+    pub fn contains(&self, at_m: [f64; 3]) -> bool {
+        let [x, y, z]: [f64; 3] = core::array::from_fn(|k| at_m[k] - self.center_m[k]);
+        let (s, c) = self.yaw_rad.sin_cos();
+        let local = [c * x + s * y, c * y - s * x, z];
+        local
+            .iter()
+            .zip(self.half_m)
+            .all(|(p, half)| p.abs() <= half)
+    }
+}
+
 /// How long the lead's centre was inside a [`BoxRegion`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dwell {

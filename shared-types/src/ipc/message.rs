@@ -5,6 +5,7 @@ use super::rpc::Rpc;
 use crate::camera::StereoCamera;
 use crate::fault::FaultCode;
 use crate::operating_mode::OperatingMode;
+use crate::plan::Task;
 use crate::rope::RopeParams;
 use arm_model::cell::Pole;
 use arm_model::joint::JointVector;
@@ -83,6 +84,19 @@ pub enum CameraRequest {
         /// Where to write a contact sheet of overlays (PNG), if anywhere.
         overlay: Option<String>,
     },
+    /// Tell where the tip is in the kept frames of a throw after which it comes to rest.
+    Look {
+        /// Calibrated camera.
+        camera: Box<StereoCamera>,
+        /// Colour of the tip.
+        tip_rgb: [u8; 3],
+        /// The domino to look for, if any.
+        domino: Option<DominoLook>,
+        /// When the throw began (CLOCK_MONOTONIC, ns).
+        from_ns: u64,
+        /// Where to write a multiple-exposure picture of the throw (PNG), if anywhere.
+        strobe: Option<String>,
+    },
     /// Measure the closest approach of tip and target in the kept frames.
     Score {
         /// Calibrated camera.
@@ -94,6 +108,33 @@ pub enum CameraRequest {
         /// Where to write a multiple-exposure picture of the throw (PNG), if anywhere.
         strobe: Option<String>,
     },
+}
+
+/// A domino that stands where a throw begins.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DominoLook {
+    /// Its colour.
+    pub rgb: [u8; 3],
+    /// Centre of its lower face (m, world).
+    pub foot_m: [f64; 3],
+    /// Its height (m).
+    pub height_m: f64,
+}
+
+/// What was seen of a throw after which the rope comes to rest. Times are from its begin (s),
+/// places in the world (m).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct SeenThrow {
+    /// When nobody looked any longer (s).
+    pub end_s: f64,
+    /// Centre of the tip, where it was seen.
+    pub tip: Vec<(f64, [f64; 3])>,
+    /// Middle of the rope; empty where it was not looked for.
+    pub middle: Vec<(f64, [f64; 3])>,
+    /// Whether the domino fell; `None` where it could not be seen.
+    pub domino_down: Option<bool>,
+    /// Whether the rope touched the first body of the scene; `None` where it could not be seen.
+    pub touched: Option<bool>,
 }
 
 /// Answers of the camera process.
@@ -141,6 +182,8 @@ pub enum CameraEvent {
     },
     /// The throw is measured.
     Scored(ScoreResult),
+    /// What was looked for was found, as far as it was in view.
+    Seen(SeenThrow),
     /// It did not work.
     Failed {
         /// One sentence: what happened and what to do.
@@ -153,7 +196,7 @@ pub enum CameraEvent {
 pub struct CameraRpc;
 
 impl Rpc for CameraRpc {
-    const NAME: &'static str = "wag/v1/camera/control";
+    const NAME: &'static str = "wag/v2/camera/control";
     type Request = CameraRequest;
     type Event = CameraEvent;
     fn is_last(event: &CameraEvent) -> bool {
@@ -364,9 +407,11 @@ impl Rpc for ControllerRpc {
 pub enum RigRequest {
     /// Which ports does the arm listen on?
     Ports,
-    /// Put the target ball there.
+    /// Put what a task is thrown at there: the target ball, or the bodies of a lob or drape.
     PlaceTarget {
-        /// Centre in the world (m).
+        /// What the throw will be for.
+        task: Task,
+        /// The target in the world (m).
         target_m: [f64; 3],
     },
     /// What really happened between two instants?
@@ -404,6 +449,8 @@ pub enum RigEvent {
         peak_tip_speed_m_s: f64,
         /// Whether the rope touched arm or column in that time.
         touched: bool,
+        /// Where tip and middle were, and what became of the task's bodies.
+        seen: Box<SeenThrow>,
     },
     /// What there is to see.
     Scene {
@@ -426,7 +473,7 @@ pub enum RigEvent {
 pub struct RigRpc;
 
 impl Rpc for RigRpc {
-    const NAME: &'static str = "wag/v3/rig/control";
+    const NAME: &'static str = "wag/v4/rig/control";
     type Request = RigRequest;
     type Event = RigEvent;
     fn is_last(_event: &RigEvent) -> bool {

@@ -7,6 +7,17 @@ use cli_output::seed;
 use shared_types::Task;
 use std::path::PathBuf;
 
+/// What throws are for, by name.
+const TASKS: [(&str, &str, Task); 3] = [
+    ("strike", "The tip passes through the target", Task::Strike),
+    (
+        "lob",
+        "The tip fells a domino on a board and stays there",
+        Task::Lob,
+    ),
+    ("drape", "The rope comes to hang over a wall", Task::Drape),
+];
+
 #[derive(Debug, Args)]
 #[command(
     group(ArgGroup::new("entry").args(["from", "again"])),
@@ -18,13 +29,9 @@ use std::path::PathBuf;
         wag run strike --arm 127.0.0.1 --camera lab"
 )]
 pub struct RunArgs {
-    /// What the throw is for.
-    #[arg(default_value = "strike", value_parser = one_of([
-        ("strike", "The tip passes through the target", Task::Strike),
-        ("lob", "", Task::Lob),
-        ("drape", "", Task::Drape),
-    ]))]
-    pub task: Task,
+    /// What the throw is for. Default: strike, or what the run resumed was for.
+    #[arg(value_parser = one_of(TASKS))]
+    pub task: Option<Task>,
     #[command(flatten)]
     pub camera: CameraArgs,
     /// Target x,y,z in the arm's base frame (m). Default: that of the run resumed; in front of
@@ -41,11 +48,11 @@ pub struct RunArgs {
     pub from: Vec<String>,
     /// Throw the strike of this run again, changed so that its miss is taken out.
     #[arg(long, value_name = "RUN", conflicts_with_all = [
-        "target", "lead_mass", "length", "robust", "dry_run", "seed",
+        "task", "target", "lead_mass", "length", "robust", "dry_run", "seed",
     ])]
     pub again: Option<PathBuf>,
-    /// Colour of the target, R,G,B from 0 to 255: by it the film of the throw tells how much it
-    /// missed.
+    /// Colour of the target, or of a lob's domino, R,G,B from 0 to 255: by it the film of the
+    /// throw tells how much it missed, or whether the domino fell.
     #[arg(long)]
     pub target_rgb: Option<Colour>,
     /// Colour of the tip, R,G,B from 0 to 255. Default: as it was tracked through the wiggle.
@@ -105,12 +112,8 @@ impl RunArgs {
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// What the throw is for; the rig has a scene for strikes only so far.
-    #[arg(long, default_value = "strike", value_parser = one_of([
-        ("strike", "The tip passes through the target", Task::Strike),
-        ("lob", "", Task::Lob),
-        ("drape", "", Task::Drape),
-    ]))]
+    /// What the throw is for.
+    #[arg(long, default_value = "strike", value_parser = one_of(TASKS))]
     pub task: Task,
     /// Seed of the hidden rope, the target, the noise and every search. When frames are taken is the
     /// machine's affair, so that two demos of one seed differ a little.

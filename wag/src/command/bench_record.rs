@@ -33,7 +33,7 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
     let planner = config::built_in::<PlannerConfig>().or_failed()?;
     let motion = wiggle(&planner.wiggle, &limits).or_failed()?;
     let rig: RigConfig = config::here(None).or_input()?;
-    let rig = pipeline::rig_config(&folder, &rig, args.seed, TARGET_M);
+    let rig = pipeline::rig_config(&folder, &rig, args.seed, Some(TARGET_M));
     let pairs = if args.quick {
         1
     } else {

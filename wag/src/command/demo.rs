@@ -15,12 +15,6 @@ use shared_types::Task;
 use std::path::{Path, PathBuf};
 
 pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
-    if args.task != Task::Strike {
-        let task = args.task.name();
-        return Err(failed!(
-            "a demo of the {task} is not implemented in this version; `wag plan {task}` plans and judges one in simulation"
-        ));
-    }
     let last = args.again.as_deref().map(last_demo).transpose()?;
     let (last, rig_config) = last.unzip();
     let rig_config = rig_config.as_ref().or(args.rig_config.as_ref());
@@ -33,7 +27,7 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
     let target_m = match (&last, args.target) {
         (Some(last), _) => last.plan.target_m,
         (None, Some(target)) => target.0,
-        (None, None) => random_target(seed),
+        (None, None) => random_target(args.task, seed),
     };
     // Refused before anything starts, whatever rope turns out to be there.
     check_target(target_m, &settings)?;
@@ -50,8 +44,9 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
         None => Entry::Wiggle,
     };
     let folder = RunFolder::create(args.out.as_deref(), &format!("demo-{seed}"))?;
-    let record = RunRecord::new("demo", seed, Some(target_m), &folder.path);
-    let rig_config = pipeline::rig_config(&folder, &rig, seed, target_m);
+    let record = RunRecord::new("demo", seed, (args.task, Some(target_m)), &folder.path);
+    let ball_m = Some(target_m).filter(|_| args.task == Task::Strike);
+    let rig_config = pipeline::rig_config(&folder, &rig.seeing(args.task), seed, ball_m);
     in_folder(&folder, record, |session, record| {
         let stage = Stage::begin("start");
         // First, because the arm's ports are found there.

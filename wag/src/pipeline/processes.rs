@@ -17,14 +17,19 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
 /// The demo's rig: a set-up with this run's domain and seed, free ports, a target.
-pub fn rig_config(folder: &RunFolder, rig: &RigConfig, seed: u64, target_m: [f64; 3]) -> RigConfig {
+pub fn rig_config(
+    folder: &RunFolder,
+    rig: &RigConfig,
+    seed: u64,
+    target_m: Option<[f64; 3]>,
+) -> RigConfig {
     RigConfig {
         domain: folder.domain.clone(),
         seed,
         bind: IpAddr::V4(Ipv4Addr::LOCALHOST),
         command_port: 0,
         report_ports: [0; 4],
-        target_m: Some(target_m),
+        target_m,
         ..rig.clone()
     }
 }

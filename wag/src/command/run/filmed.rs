@@ -4,22 +4,26 @@ use super::stages::{Run, UNNAMED_COLOURS, answered};
 use super::summary;
 use crate::command::motion;
 use crate::pipeline::{self, execute};
-use anyhow::{anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use arm_model::JointTrajectory;
-use cli_output::{Failure, Stage};
+use cli_output::{Failure, Stage, output};
 use planner::arm_response::Following;
-use planner::plan::{Shortcoming, shortcoming};
+use planner::plan::{Shortcoming, ThrowGoal, judge_seen, shortcoming};
 use run_log::{Film, files};
 use session::Session;
-use shared_types::ipc::message::{CameraEvent, CameraRequest, RigRequest};
-use shared_types::{OperatingMode, Plan};
+use shared_types::ipc::message::{CameraEvent, CameraRequest, DominoLook, RigEvent, RigRequest};
+use shared_types::{MonotonicNs, OperatingMode, Plan, RopeParams, Task, Verdict};
 
 /// Frames of a wiggle (paper: 400 at 60 Hz).
 const WIGGLE_FRAMES: u32 = 400;
-/// Frames of a throw: two and a half seconds.
-const THROW_FRAMES: u32 = 150;
-/// Time after the last setpoint that still belongs to the throw (ns).
-const AFTER_THROW_NS: u64 = 600_000_000;
+/// Frames per second.
+const RATE_HZ: f64 = 60.0;
+/// Frames of a strike: two and a half seconds.
+const STRIKE_FRAMES: u32 = 150;
+/// Time after the last setpoint that still belongs to a strike (s).
+const AFTER_STRIKE_S: f64 = 0.6;
+/// From the first frame of a film to the motion's begin, at most (s).
+const BEFORE_THROW_S: f64 = 0.4;
 
 impl Run<'_> {
     /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
@@ -119,25 +123,88 @@ impl Run<'_> {
         }
     }
 
+    /// Puts what the throw is for in its place, where a rig can, or tells a person to. A lob's
+    /// board or a drape's wall would be in the wiggle's way before.
+    fn place(&mut self, target_m: [f64; 3]) -> anyhow::Result<()> {
+        let task = self.record.task;
+        if let Some(rig) = &self.setup.rig {
+            let place = RigRequest::PlaceTarget { task, target_m };
+            return match self.session.ask(rig, &place, 5.0, |_| ())? {
+                RigEvent::Done => Ok(()),
+                RigEvent::Failed { message } => bail!(message),
+                other => bail!("the rig answered with {other:?}"),
+            };
+        }
+        let ([x, y, z], cell) = (target_m, self.setup.settings.cell);
+        let what = match task {
+            Task::Strike => return Ok(()),
+            Task::Lob => format!(
+                "the board of {:?} m with the middle of its upper face, and the domino {} m before it,",
+                cell.board.size_m, cell.domino.before_target_m
+            ),
+            Task::Drape => format!(
+                "the wall of {:?} m with the middle of its upper edge",
+                cell.wall.size_m
+            ),
+        };
+        output::remark(format_args!(
+            "put {what} at ({x:.3}, {y:.3}, {z:.3}) m, square to the line from the arm's base, without touching the rope"
+        ));
+        Ok(())
+    }
+
     /// Throws once, open loop, filmed.
     pub fn throw(&mut self, plan: &Plan) -> anyhow::Result<Film> {
+        self.place(plan.target_m)?;
         self.arm_for(OperatingMode::Throw)?;
         let stage = Stage::begin("throw");
         // Empties the histograms, so that they hold this throw alone.
         pipeline::latency(self.session, &self.arm)?;
-        let film = self.film(THROW_FRAMES, &plan.trajectory, true, &stage)?;
+        let frames = match self.rests_s() {
+            None => STRIKE_FRAMES,
+            Some(rests_s) => {
+                let lasts_s = BEFORE_THROW_S + plan.trajectory.duration_s() + rests_s;
+                (RATE_HZ * lasts_s).ceil() as u32
+            }
+        };
+        let film = self.film(frames, &plan.trajectory, true, &stage)?;
         self.record.set_throw(film);
         self.record.latency = Some(pipeline::latency(self.session, &self.arm)?);
         self.record.stages.throw_s = stage.done(&summary::of_film(&film));
         Ok(film)
     }
 
-    /// Measures the closest approach of tip and target by the camera. That it could not
+    /// The task's values, where the target is known.
+    fn goal(&self) -> Option<ThrowGoal> {
+        let target_m = self.record.target_m?;
+        Some(self.setup.settings.goal(self.record.task, target_m))
+    }
+
+    /// How long the rope of a lob or drape comes to rest after the motion's end (s).
+    fn rests_s(&self) -> Option<f64> {
+        let goal = self.goal().filter(|goal| goal.kind() != Task::Strike)?;
+        Some(goal.task().config().observed_s)
+    }
+
+    /// Measures by the camera what the throw was for. That it could not
     /// see the throw does not undo the throw; it is reported.
-    pub fn score(&mut self) {
+    pub fn score(&mut self, throw: &Film, rope: &RopeParams) {
         let tracked = self.record.track.as_ref();
         let tracked = tracked.map(|track| track.appearance.lead_rgb);
         self.record.tip_rgb = self.record.tip_rgb.or(tracked);
+        if self.record.task != Task::Strike {
+            let stage = Stage::begin("score");
+            let judged = self.judge(throw, rope, &stage);
+            self.record.stages.score_s = stage.done(&match &judged {
+                Ok(verdict) => format!("by camera: {verdict}"),
+                Err(_) => "the camera could not judge the throw".to_owned(),
+            });
+            match judged {
+                Ok(verdict) => self.record.camera_verdict = Some(verdict),
+                Err(why) => self.record.set_score(Err(why)),
+            }
+            return;
+        }
         let Some((tip_rgb, target_rgb)) = self.record.tip_rgb.zip(self.record.target_rgb) else {
             return self.record.set_score(Err(anyhow!(UNNAMED_COLOURS)));
         };
@@ -160,16 +227,57 @@ impl Run<'_> {
         self.record.set_score(score);
     }
 
+    /// Judges a lob or drape by what the camera sees of tip and domino.
+    fn judge(&mut self, throw: &Film, rope: &RopeParams, stage: &Stage) -> anyhow::Result<Verdict> {
+        let goal = self.goal().context("a throw needs a target")?;
+        let cell = self.setup.settings.cell;
+        let domino = goal.task().scene(&cell).domino;
+        let request = CameraRequest::Look {
+            camera: Box::new(self.setup.camera.clone()),
+            tip_rgb: self
+                .record
+                .tip_rgb
+                .ok_or_else(|| anyhow!(UNNAMED_COLOURS))?,
+            domino: domino
+                .zip(self.record.target_rgb)
+                .map(|(domino, rgb)| DominoLook {
+                    rgb,
+                    foot_m: domino.foot_m,
+                    height_m: domino.height_m,
+                }),
+            from_ns: throw.motion.start_ns,
+            strobe: Some(self.folder.file("throw.png").display().to_string()),
+        };
+        match self.ask_camera(&request, 60.0, stage)? {
+            CameraEvent::Seen(seen) => Ok(judge_seen(&goal, rope, &cell, &seen)
+                .map_err(anyhow::Error::msg)?
+                .verdict),
+            other => bail!("the camera process answered with {other:?}"),
+        }
+    }
+
     /// Only now a rig is asked what really happened.
     pub fn compare_with_truth(&mut self, throw: &Film) -> anyhow::Result<()> {
         let Some(rig) = &self.setup.rig else {
             return Ok(());
         };
+        let rests_s = self.rests_s();
+        let after_s = rests_s.unwrap_or(AFTER_STRIKE_S);
         let request = RigRequest::Truth {
             from_ns: throw.motion.start_ns,
-            to_ns: throw.motion.end_ns + AFTER_THROW_NS,
+            to_ns: MonotonicNs(throw.motion.end_ns).plus_s(after_s).0,
         };
         let truth = self.session.ask(rig, &request, 10.0, |_| ())?;
+        if let (RigEvent::Truth { rope, seen, .. }, Some(goal), Some(_)) =
+            (&truth, self.goal(), rests_s)
+        {
+            let cell = &self.setup.settings.cell;
+            let judged = judge_seen(&goal, rope, cell, seen).map_err(anyhow::Error::msg)?;
+            self.record.set_truth(truth)?;
+            self.record.true_verdict = Some(judged.verdict);
+            self.record.true_tip_target_distance_m = judged.error_m;
+            return Ok(());
+        }
         self.record.set_truth(truth)
     }
 }

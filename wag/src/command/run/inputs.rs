@@ -31,6 +31,7 @@ pub struct Inputs {
     pub names_calibration: bool,
     /// The command port of the simulated rig that films, if one does.
     rig_port: Option<u16>,
+    pub task: Task,
     pub target_m: Option<[f64; 3]>,
     pub colours: Colours,
     pub accept_unconfirmed: bool,
@@ -94,11 +95,12 @@ pub fn entry(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Entry> {
         FromStage::Throw => {
             let plan = read_plan(&folder.join(files::PLAN)).or_input()?;
             check_thrown(&plan, accept)?;
-            if plan.task != Task::Strike {
-                let task = plan.task.name();
+            if let Some(task) = args.task.filter(|task| *task != plan.task) {
                 return Err(bad_input!(
-                    "the plan of `{}` is a {task}'s",
-                    folder.display()
+                    "the plan of `{}` is for a {}, not for a {}",
+                    folder.display(),
+                    plan.task.name(),
+                    task.name()
                 ));
             }
             Entry::Plan(Box::new(plan))
@@ -106,20 +108,23 @@ pub fn entry(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Entry> {
     })
 }
 
-/// What an earlier run tells of its target: where it was, and the colours of tip and target.
-fn earlier(args: &RunArgs) -> Outcome<(Option<[f64; 3]>, Colours)> {
+/// What an earlier run tells: what its throw was for, where its target was, and the colours of tip
+/// and target.
+fn earlier(args: &RunArgs) -> Outcome<(Option<Task>, Option<[f64; 3]>, Colours)> {
     let resumed = resumed(args)?.map(|(_, folder)| folder);
     let Some(folder) = resumed.or_else(|| args.again.clone()) else {
-        return Ok((None, [None; 2]));
+        return Ok((None, None, [None; 2]));
     };
     let run = RecordedRun::open(&folder).or_input()?;
-    let planned = run.plan().or_input()?.map(|plan| plan.target_m);
+    let plan = run.plan().or_input()?;
     let summary = run.summary().or_input()?.unwrap_or_default();
     let colour = |value: &Value| serde_json::from_value(value.clone()).ok();
     let tip_rgb = colour(&summary["tip_rgb"]).or_else(|| colour(&summary["track"]["lead_rgb"]));
     let target_m = serde_json::from_value(summary["target_m"].clone()).ok();
+    let task = serde_json::from_value(summary["task"].clone()).ok();
     Ok((
-        planned.or(target_m),
+        plan.as_ref().map(|plan| plan.task).or(task),
+        plan.map(|plan| plan.target_m).or(target_m),
         [tip_rgb, colour(&summary["target_rgb"])],
     ))
 }
@@ -165,6 +170,7 @@ impl Inputs {
             calibration,
             names_calibration: args.calibration.is_some(),
             rig_port,
+            task: Task::Strike,
             target_m: None,
             colours: [None; 2],
             accept_unconfirmed: false,
@@ -182,13 +188,15 @@ impl Inputs {
     pub fn of_run(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Self> {
         let named = args.target.map(|target| target.0);
         named.map_or(Ok(()), |target_m| check_target(target_m, settings))?;
-        let (target_m, [tip_rgb, target_rgb]) = earlier(args)?;
+        let (task, target_m, [tip_rgb, target_rgb]) = earlier(args)?;
         let found = Self::of_camera(&args.camera, args.out.as_deref())?;
-        let target_m = named.or(target_m);
+        let of_task = args.task.is_none() || args.task == task;
+        let target_m = named.or(target_m.filter(|_| of_task));
         if target_m.is_none() && found.rig_port.is_none() {
             return Err(bad_input!("name the target with --target X,Y,Z"));
         }
         Ok(Self {
+            task: args.task.or(task).unwrap_or(Task::Strike),
             target_m,
             colours: [
                 args.tip_rgb.map(|named| named.0).or(tip_rgb),

@@ -18,7 +18,7 @@ use super::{dry_run, motion};
 use crate::cli::{ArmArgs, RunArgs, WiggleArgs};
 use crate::config;
 use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene};
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use inputs::{Inputs, entry};
@@ -29,19 +29,24 @@ use rand_chacha::ChaCha8Rng;
 use run_log::{RunRecord, files};
 use serde_json::{Value, json};
 use session::Session;
-use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
+use shared_types::ipc::message::{RigRequest, RigRpc};
 use shared_types::{OperatingMode, Task};
 use std::path::Path;
 use std::time::Instant;
 use viewer::report;
 
-/// A target drawn from the seed where ropes of every length can strike
+/// A target drawn from the seed where ropes of every length can do the task
 /// (distance from the base axis, height, bearing).
-pub fn random_target(seed: u64) -> [f64; 3] {
+pub fn random_target(task: Task, seed: u64) -> [f64; 3] {
+    let (rhos_m, heights_m) = match task {
+        Task::Strike => (0.85..1.05, -0.10..0.60),
+        Task::Lob => (0.80..0.90, 0.10..0.25),
+        Task::Drape => (0.70..0.80, 0.20..0.35),
+    };
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(0x7a26_e701);
-    let rho = rng.random_range(0.85..1.05);
-    let height = rng.random_range(-0.10..0.60);
+    let rho: f64 = rng.random_range(rhos_m);
+    let height = rng.random_range(heights_m);
     let bearing: f64 = rng.random_range(-20.0_f64..20.0).to_radians();
     [rho * bearing.cos(), rho * bearing.sin(), height]
 }
@@ -94,12 +99,6 @@ fn settings(args: &RunArgs) -> Outcome<PlannerConfig> {
 }
 
 pub fn run(args: &RunArgs) -> Outcome<Option<Value>> {
-    if args.task != Task::Strike {
-        let task = args.task.name();
-        return Err(failed!(
-            "a run of the {task} is not implemented in this version; `wag plan {task}` plans and judges one in simulation"
-        ));
-    }
     let settings = settings(args)?;
     if args.arm.dry_run {
         return tell(args, &settings);
@@ -216,7 +215,8 @@ fn on_camera(
         folder.domain.clone_from(domain);
     }
     let by_service = address.service.is_some();
-    let mut record = RunRecord::new(name, seed, inputs.target_m, &folder.path);
+    let goal = (inputs.task, inputs.target_m);
+    let mut record = RunRecord::new(name, seed, goal, &folder.path);
     record.operator = operator;
     let done = |session: &mut Session, record: &mut RunRecord| {
         let stage = Stage::begin("start");
@@ -239,13 +239,9 @@ fn on_camera(
         record.tip_rgb = tip_rgb.or(colours.map(|[tip_rgb, _]| tip_rgb));
         record.target_rgb = target_rgb.or(colours.map(|[_, target_rgb]| target_rgb));
         if !matches!(entry, Entry::WiggleAlone) {
-            let target_m = inputs.target_m.unwrap_or_else(|| random_target(seed));
+            let task = inputs.task;
+            let target_m = inputs.target_m.unwrap_or_else(|| random_target(task, seed));
             record.target_m = Some(target_m);
-            if let Some(rig) = &rig {
-                let place = RigRequest::PlaceTarget { target_m };
-                let placed = session.ask(rig, &place, 5.0, |_| ())?;
-                ensure!(placed == RigEvent::Done, "the rig answered with {placed:?}");
-            }
         }
         let setup = Setup {
             settings,

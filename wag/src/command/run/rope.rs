@@ -16,7 +16,7 @@ use planner::settle::SettleRequest;
 use rt_controller::os::now_ns;
 use run_log::{Film, Settled, Tracked, files};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, RopeAppearance};
-use shared_types::{MonotonicNs, OperatingMode, Plan, RopeParams, Task};
+use shared_types::{MonotonicNs, OperatingMode, Plan, RopeParams};
 use std::time::Duration;
 
 /// The joint that wiggles (0-based).
@@ -176,7 +176,7 @@ impl Run<'_> {
             ..
         } = &self.setup;
         let target_m = self.record.target_m.context("a throw needs a target")?;
-        let goal = settings.goal(Task::Strike, target_m);
+        let goal = settings.goal(self.record.task, target_m);
         let request = PlannerRequest::Plan(Box::new(PlanRequest {
             limits: limits.clone(),
             cell: settings.cell,

@@ -19,7 +19,7 @@ use run_log::{Film, RunRecord};
 use session::Session;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRpc, RopeAppearance};
 use shared_types::ipc::rpc::RpcClient;
-use shared_types::{OperatingMode, Plan, StereoCamera};
+use shared_types::{OperatingMode, Plan, StereoCamera, Task};
 
 /// Speed of moves between poses, as a part of the fastest move.
 ///
@@ -118,7 +118,7 @@ impl<'a> Run<'a> {
             arm,
         };
         run.look(stage)?;
-        let is_thrown = run.record.target_m.is_some();
+        let is_thrown = run.record.target_m.is_some() && run.record.task != Task::Drape;
         if is_thrown && run.record.target_rgb.is_none() {
             run.warn(&format!(
                 "the throw will not be measured: {UNNAMED_COLOURS}"
@@ -184,7 +184,7 @@ impl<'a> Run<'a> {
         };
         let throw = self.throw(&plan)?;
         if throw.frames > 0 {
-            self.score();
+            self.score(&throw, &plan.rope);
         }
         self.compare_with_truth(&throw)?;
         self.record.ok = true;

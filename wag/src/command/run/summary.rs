@@ -5,7 +5,7 @@ use cli_output::table;
 use comfy_table::Table;
 use run_log::{Film, RunRecord};
 use shared_types::rope::{RANGES, ROPE_PARAMETERS};
-use shared_types::{RopeEstimate, RopeParams};
+use shared_types::{RopeEstimate, RopeParams, Task};
 
 fn rope_table(estimate: &RopeEstimate, truth: &RopeParams) -> Table {
     let (found, real) = (estimate.params.to_array(), truth.to_array());
@@ -66,7 +66,13 @@ pub fn show(record: &RunRecord) {
         println!("run folder: {}", record.run);
         return;
     };
-    println!("target ({x:.3}, {y:.3}, {z:.3}) m, closest approach of the tip:");
+    let told = match record.task {
+        Task::Strike => "closest approach of the tip",
+        Task::Lob => "closest approach of the tip, and what became of it",
+        Task::Drape => "distance of the rope's middle from the edge, and what became of it",
+    };
+    let task = record.task.name();
+    println!("{task}, target ({x:.3}, {y:.3}, {z:.3}) m, {told}:");
     let planned = cm(record.planned_tip_target_distance_m);
     println!("  planned      {planned}");
     let interval = record
@@ -80,6 +86,14 @@ pub fn show(record: &RunRecord) {
     if record.true_tip_target_distance_m.is_some() {
         let achieved = cm(record.true_tip_target_distance_m);
         println!("  achieved     {achieved}   (the simulator's truth)");
+    }
+    for (verdict, whose) in [
+        (&record.true_verdict, "the simulator's truth"),
+        (&record.camera_verdict, "by camera"),
+    ] {
+        if let Some(verdict) = verdict {
+            println!("  {verdict}   ({whose})");
+        }
     }
     match (&record.score, &record.score_failed) {
         (Some(score), _) => println!(

@@ -1,0 +1,149 @@
+//! Where the tip goes in a throw after which it comes to rest, and whether a domino stands.
+//!
+//! A tip that lies still for most of the film would be taken for the scene behind it: the scene
+//! is what the film's first frames show, in which the rope still hangs. The domino is known by
+//! its pixels there: as long as it stands, they keep its colour.
+
+use super::blob::{Chroma, chroma_of_rgb, coverage};
+use super::path::{LocalPath, mark_small};
+use super::scene::{Scene, blob_error, read_sized};
+use super::{MIN_DETECTIONS, ScoreError, check_colour};
+use crate::frame::{ImageFrame, StereoFrame};
+use crate::source::StereoSource;
+use nalgebra::Vector3;
+use shared_types::ipc::message::{DominoLook, SeenThrow};
+use shared_types::{MonotonicNs, StereoCamera};
+
+/// Frames before the throw moves anything, and frames after it has come to rest.
+const FIRST_FRAMES: usize = 9;
+const LAST_FRAMES: usize = 15;
+/// Around the domino's projection: what a calibration is off by, and more (px).
+const WINDOW_PX: f64 = 14.0;
+/// Coverage from which a sample shows the domino.
+const COVERED: f64 = 0.4;
+/// Samples of it in both images that make it visible.
+const MIN_SAMPLES: usize = 6;
+/// Part of its samples that keep its colour as long as it stands.
+const STANDS: f64 = 0.5;
+/// Part of them that the tip may cover before nothing can be told.
+const COVERED_BY_TIP: f64 = 0.3;
+
+/// Looks for tip and domino in all frames; `from_ns` is the begin of the throw
+/// (CLOCK_MONOTONIC).
+///
+/// # Errors
+/// Unreadable frames, colours without chroma, or a tip that is not seen.
+pub fn look(
+    source: &mut dyn StereoSource,
+    camera: &StereoCamera,
+    tip_rgb: [u8; 3],
+    domino: Option<&DominoLook>,
+    from_ns: u64,
+) -> Result<SeenThrow, ScoreError> {
+    let frames = source.len();
+    if frames < FIRST_FRAMES + LAST_FRAMES {
+        return Err(ScoreError::Input(format!(
+            "the film has {frames} frames, at least {} are needed",
+            FIRST_FRAMES + LAST_FRAMES
+        )));
+    }
+    check_colour("tip", tip_rgb)?;
+    domino.map_or(Ok(()), |domino| check_colour("domino", domino.rgb))?;
+    let first: Vec<usize> = (0..FIRST_FRAMES).collect();
+    let scene = Scene::of_frames(source, camera, &first)?;
+    let (mut detections, mut end_s) = (Vec::new(), 0.0);
+    let mut last = Vec::new();
+    for index in 0..frames {
+        let frame = read_sized(source, index, camera)?;
+        let since_s = MonotonicNs(frame.0.stamp_ns).since_s(MonotonicNs(from_ns));
+        end_s = since_s;
+        let near = detections.last().copied();
+        let images = [&frame.left(), &frame.right()];
+        detections.extend(scene.tip(images, tip_rgb, None, near, since_s));
+        if index + LAST_FRAMES >= frames {
+            last.push(frame);
+        }
+    }
+    if detections.len() < MIN_DETECTIONS {
+        return Err(ScoreError::NotSeen {
+            what: "tip",
+            seen: detections.len(),
+            least: MIN_DETECTIONS,
+        });
+    }
+    mark_small(&mut detections);
+    let to_world = |p: Vector3<f64>| camera.p_w_cam_m + camera.r_w_cam * p;
+    let paths = (0..detections.len())
+        .filter_map(|index| LocalPath::around(&detections, index, blob_error(camera)));
+    let tip = paths.map(|path| (path.t_s, to_world(path.at(path.t_s)).into()));
+    let fell = domino.and_then(|domino| has_fallen(&scene, camera, domino, tip_rgb, &last));
+    Ok(SeenThrow {
+        end_s,
+        tip: tip.collect(),
+        domino_down: fell,
+        ..SeenThrow::default()
+    })
+}
+
+/// Whether the domino's pixels have lost its colour; `None` where it was not seen at first, or
+/// where the tip lies before it.
+fn has_fallen(
+    scene: &Scene<'_>,
+    camera: &StereoCamera,
+    domino: &DominoLook,
+    tip_rgb: [u8; 3],
+    last: &[StereoFrame],
+) -> Option<bool> {
+    let (wanted, tip) = (chroma_of_rgb(domino.rgb), chroma_of_rgb(tip_rgb));
+    let eyes: [fn(&StereoFrame) -> ImageFrame; 2] = [StereoFrame::left, StereoFrame::right];
+    let (mut seen, mut kept, mut hidden) = (0_usize, 0_usize, 0_usize);
+    for (k, (of, image)) in eyes.iter().zip(&scene.images).enumerate() {
+        let frames: Vec<_> = last.iter().map(of).collect();
+        let now = crate::track::median_frame(&frames);
+        let middle = scene.middles[k];
+        let covers = |frame: &ImageFrame, at: usize, colour: Chroma| {
+            let sample = [frame.cb[at], frame.cr[at]].map(|c| f64::from(c) - 128.0);
+            coverage(sample, middle, colour) > COVERED
+        };
+        for at in window(camera, k, domino, image)? {
+            if covers(image, at, wanted) {
+                seen += 1;
+                kept += usize::from(covers(&now, at, wanted));
+                hidden += usize::from(covers(&now, at, tip));
+            }
+        }
+    }
+    let part = |samples: usize| samples as f64 / seen as f64;
+    let is_known = seen >= MIN_SAMPLES && part(hidden) < COVERED_BY_TIP;
+    is_known.then(|| part(kept) < STANDS)
+}
+
+/// Chroma samples around the domino in one image; `None` where it is out of view.
+fn window(
+    camera: &StereoCamera,
+    eye: usize,
+    domino: &DominoLook,
+    image: &ImageFrame,
+) -> Option<Vec<usize>> {
+    let foot = Vector3::from(domino.foot_m);
+    let top = foot + Vector3::z() * domino.height_m;
+    let project = |p: &Vector3<f64>| match eye {
+        0 => camera.project_left(p),
+        _ => camera.project_right(p),
+    };
+    let (foot, top) = (project(&foot)?, project(&top)?);
+    let range = |low: f64, high: f64, size: usize| {
+        let from = (low.min(high) - WINDOW_PX).max(0.0) as usize;
+        from..((low.max(high) + WINDOW_PX).max(0.0) as usize).min(size)
+    };
+    let (columns, rows) = (
+        range(foot[0], top[0], image.width_px),
+        range(foot[1], top[1], image.height_px),
+    );
+    let per_row = image.width_px / 2;
+    let columns = columns.start / 2..columns.end / 2;
+    Some(
+        rows.flat_map(|v| columns.clone().map(move |u| v * per_row + u))
+            .collect(),
+    )
+}
