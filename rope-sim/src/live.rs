@@ -328,10 +328,11 @@ impl LaneTask for Advance<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Candidate, FrameTimes, Precision, SimOptions, roll_out};
+    use crate::{Candidate, FrameTimes, Precision, SimOptions, roll_out, roll_out_in};
+    use arm_model::Cell;
     use core::f64::consts::TAU;
     use nalgebra::Rotation3;
-    use shared_types::{BendingFriction, RopeExtras};
+    use shared_types::{BendingFriction, RopeExtras, Task};
 
     fn rope() -> RopeParams {
         RopeParams::from_array([22.0, 0.55, 0.02, 0.3, 0.008, 0.06, 0.06, 0.03, 0.8])
@@ -397,6 +398,67 @@ mod tests {
                 assert!(d < 1e-7, "node {node} differs by {d} m");
             }
         }
+    }
+
+    /// The same fall onto a board with a domino, live and in a batch; without a scene the rope
+    /// would go on.
+    #[test]
+    fn meets_obstacles_as_the_batch_does() {
+        let attach = |t_s: f64| {
+            let s = (4.0 * t_s).min(core::f64::consts::PI);
+            let w = if s < core::f64::consts::PI { 4.0 } else { 0.0 };
+            FrameMotion {
+                p_m: Vector3::new(0.5, 0.0, 0.85 - 0.2 * (1.0 - s.cos())),
+                v_m_s: Vector3::new(0.0, 0.0, -0.2 * w * s.sin()),
+                a_m_s2: Vector3::new(0.0, 0.0, -0.2 * w * w * s.cos()),
+                ..FrameMotion::world()
+            }
+        };
+        let scene = Scene::of_task(Task::Lob, [0.56, 0.0, 0.2], &Cell::default());
+        let rope = rope();
+        let horizon_s = 1.6;
+        let options = SimOptions {
+            frames: FrameTimes {
+                first_s: horizon_s,
+                period_s: 1.0,
+                count: 1,
+            },
+            ..SimOptions::new(1e-4, Precision::F64, horizon_s)
+        };
+        let batch = roll_out_in(&scene, &[Candidate::new(&rope, &attach)], &options).unwrap();
+        let follow = |scene: &Scene| {
+            let mut live = LiveRope::new(&rope, &attach(0.0), 1e-4).unwrap();
+            live.set_scene(scene, &attach(0.0)).unwrap();
+            for cycle in 1..=400 {
+                live.advance(&attach, f64::from(cycle) * 0.004);
+            }
+            live
+        };
+        let live = follow(&scene);
+        for (node, at) in live.nodes().iter().enumerate() {
+            let d = (batch[0].nodes.position(0, node) - at).norm();
+            assert!(d < 2e-3, "node {node} differs by {d} m");
+        }
+        let fell = |domino: Option<DominoOutcome>| domino.unwrap().down_at_s.is_some();
+        assert_eq!(fell(live.domino()), fell(batch[0].domino));
+        assert!(live.has_touched(0) && batch[0].contacts[0].touched());
+        let tip_m = live.nodes().last().unwrap().z;
+        assert!((tip_m - 0.2 - rope.lead_radius_m).abs() < 2e-3, "{tip_m} m");
+        assert!(follow(&Scene::EMPTY).nodes().last().unwrap().z < 0.1);
+    }
+
+    #[test]
+    fn a_body_where_the_rope_hangs_is_refused() {
+        let attach = FrameMotion {
+            p_m: Vector3::new(0.5, 0.0, 0.6),
+            ..FrameMotion::world()
+        };
+        let mut live = LiveRope::new(&rope(), &attach, 1e-4).unwrap();
+        let wall = |x_m: f64| Scene::of_task(Task::Drape, [x_m, 0.0, 0.3], &Cell::default());
+        let why = live.set_scene(&wall(0.5), &attach).unwrap_err().to_string();
+        assert!(why.contains("deep in obstacle 0"), "{why}");
+        live.set_scene(&wall(0.8), &attach).unwrap();
+        assert_eq!(live.domino(), None);
     }
 
     #[test]

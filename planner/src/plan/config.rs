@@ -71,6 +71,8 @@ pub struct Robustness {
     pub damping: f64,
     /// Change of lead mass over rope mass (1).
     pub lead_mass: f64,
+    /// Change of the lead's radius (1); 0 where nothing is to be touched with it.
+    pub lead_radius: f64,
 }
 
 impl Default for Robustness {
@@ -82,6 +84,7 @@ impl Default for Robustness {
             stiffness: 0.03,
             damping: 0.03,
             lead_mass: 0.02,
+            lead_radius: 0.0,
         }
     }
 }
@@ -102,6 +105,13 @@ impl Robustness {
             }
             varied[3].lead_mass_kg *= 1.0 + sign * self.lead_mass;
             out.extend(varied);
+            if self.lead_radius > 0.0 {
+                let lead_radius_m = rope.lead_radius_m * (1.0 + sign * self.lead_radius);
+                out.push(RopeParams {
+                    lead_radius_m,
+                    ..*rope
+                });
+            }
         }
         out
     }

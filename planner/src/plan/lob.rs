@@ -53,6 +53,7 @@ impl Default for LobConfig {
                 stop_success_fraction: Some(0.3),
                 robustness: Robustness {
                     finalists: 8,
+                    lead_radius: 0.1,
                     ..Robustness::default()
                 },
                 ..ThrowConfig::default()

@@ -40,7 +40,7 @@ use viewer::report;
 pub fn random_target(task: Task, seed: u64) -> [f64; 3] {
     let (rhos_m, heights_m) = match task {
         Task::Strike => (0.85..1.05, -0.10..0.60),
-        Task::Lob => (0.80..0.90, 0.10..0.25),
+        Task::Lob => (0.85..0.95, 0.05..0.25),
         Task::Drape => (0.70..0.80, 0.20..0.35),
     };
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -1,0 +1,123 @@
+//! What the camera tells of lobs and drapes, in the rig's pictures: where the tip comes to
+//! rest, and whether the domino fell.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use arm_model::Cell;
+use arm_model::joint::START_POSE;
+use camera_ingest::frame::StereoFrame;
+use camera_ingest::score::look;
+use nalgebra::Vector3;
+use rig_sim::render::{Appearance, Renderer, RopeShape, ScenePose, TaskBodies};
+use rig_sim::{CameraConfig, RigConfig};
+use rope_sim::{Scene, TaskFrame};
+use shared_types::Task;
+use shared_types::ipc::message::{DominoLook, SeenThrow};
+
+const RATE_HZ: f64 = 60.0;
+const FRAMES: u32 = 200;
+/// The tip leaves where it hangs, and lies still again (s).
+const LEAVES_S: f64 = 0.5;
+const RESTS_S: f64 = 1.5;
+const LEAD_RADIUS_M: f64 = 0.025;
+
+/// A tip that goes from where it hangs to `end_m` by a way above both.
+fn tip(end_m: Vector3<f64>, t_s: f64) -> Vector3<f64> {
+    let start_m = Vector3::new(0.62, 0.0, -0.2);
+    let u = ((t_s - LEAVES_S) / (RESTS_S - LEAVES_S)).clamp(0.0, 1.0);
+    let arc_m = 0.4 * (core::f64::consts::PI * u).sin();
+    start_m + (end_m - start_m) * u + Vector3::z() * arc_m
+}
+
+/// Films a throw whose tip ends at a place of the target's frame; the domino falls at 1.4 s, if
+/// it does.
+fn film(task: Task, target_m: [f64; 3], end_m: [f64; 3], falls: bool, seed: u64) -> SeenThrow {
+    let config: CameraConfig = RigConfig::default().seeing(task).camera;
+    let (camera, cell) = (config.stereo_camera(), Cell::default());
+    let appearance = Appearance::from_seed(seed);
+    let shape = RopeShape {
+        radius_m: 0.005,
+        lead_radius_m: LEAD_RADIUS_M,
+    };
+    let mut renderer = Renderer::new(&camera, &cell, shape, appearance, config.noise_levels, seed);
+    let scene = Scene::of_task(task, target_m, &cell);
+    renderer.place_bodies(Some(TaskBodies::of(&scene, appearance.target_rgb)));
+    let end_m = Vector3::from(TaskFrame::at(target_m).point(end_m));
+    let mut bytes = vec![0; renderer.frame_bytes()];
+    let mut frames: Vec<StereoFrame> = (0..FRAMES)
+        .map(|index| {
+            let t_s = f64::from(index) / RATE_HZ;
+            renderer.lean_domino(if falls && t_s > 1.4 { 1.0 } else { 0.0 });
+            let at = tip(end_m, t_s + config.exposure_s / 2.0);
+            let clamp_m = Vector3::new(0.6, 0.0, 0.45);
+            let nodes = (0..=10).map(|k| clamp_m + (at - clamp_m) * (f64::from(k) / 10.0));
+            let pose = ScenePose {
+                q: START_POSE,
+                nodes: nodes.collect(),
+            };
+            renderer.render(&[pose], u64::from(index), &mut bytes);
+            let size = [2 * camera.width_px as usize, camera.height_px as usize];
+            let stamp_ns = 1_000_000_000 + (1e9 * t_s) as u64;
+            StereoFrame::from_yuyv(&bytes, size, stamp_ns, u64::from(index)).unwrap()
+        })
+        .collect();
+    let domino = scene.domino.map(|domino| DominoLook {
+        rgb: appearance.target_rgb,
+        foot_m: domino.foot_m,
+        height_m: domino.height_m,
+    });
+    let from_ns = 1_000_000_000;
+    look(
+        &mut frames,
+        &camera,
+        appearance.lead_rgb,
+        domino.as_ref(),
+        from_ns,
+    )
+    .unwrap()
+}
+
+/// The places of the last second against the truth: (along the line of sight, across it) (m).
+fn worst_m(seen: &SeenThrow, end_m: Vector3<f64>) -> [f64; 2] {
+    let last = seen.tip.iter().filter(|(t_s, _)| *t_s > seen.end_s - 1.0);
+    last.fold([0.0, 0.0], |[along, across]: [f64; 2], (_, at)| {
+        let error = Vector3::from(*at) - end_m;
+        [along.max(error.y.abs()), across.max(error.x.hypot(error.z))]
+    })
+}
+
+#[test]
+fn a_tip_on_the_board_and_a_domino_are_seen_at_every_bearing() {
+    for (seed, bearing_deg) in [(1_u64, -20.0_f64), (2, 0.0), (3, 20.0), (4, 8.0)] {
+        let (s, c) = bearing_deg.to_radians().sin_cos();
+        let target_m = [0.85 * c, 0.85 * s, 0.10 + 0.05 * seed as f64];
+        for falls in [false, true] {
+            let local_m = [0.03, 0.02, LEAD_RADIUS_M];
+            let seen = film(Task::Lob, target_m, local_m, falls, seed);
+            let end_m = Vector3::from(TaskFrame::at(target_m).point(local_m));
+            let told = format!("seed {seed}, falls {falls}: {:?}", worst_m(&seen, end_m));
+            assert_eq!(seen.domino_down, Some(falls), "{told}");
+            let [along_m, across_m] = worst_m(&seen, end_m);
+            assert!(along_m < 0.04 && across_m < 0.012, "{told}");
+            let last_s = seen.tip.last().unwrap().0;
+            assert!(seen.end_s - last_s < 0.05, "unseen at the end, {told}");
+        }
+    }
+}
+
+#[test]
+fn a_tip_behind_the_wall_is_seen_hanging() {
+    for (seed, bearing_deg) in [(5_u64, -20.0_f64), (6, 0.0), (7, 20.0)] {
+        let (s, c) = bearing_deg.to_radians().sin_cos();
+        let target_m = [0.75 * c, 0.75 * s, 0.3];
+        let local_m = [0.01 + LEAD_RADIUS_M, 0.0, -0.25];
+        let seen = film(Task::Drape, target_m, local_m, false, seed);
+        let end_m = Vector3::from(TaskFrame::at(target_m).point(local_m));
+        let [along_m, across_m] = worst_m(&seen, end_m);
+        assert!(
+            along_m < 0.04 && across_m < 0.012,
+            "seed {seed}: {along_m} {across_m}"
+        );
+        assert_eq!(seen.domino_down, None);
+    }
+}
