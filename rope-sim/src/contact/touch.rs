@@ -4,8 +4,9 @@
 //! spring so damped that the contact is inelastic. A tau shorter than the spring's own
 //! time would let it bounce, so it does not shrink with steps shorter than those of
 //! throws. The force acts already before the surface is reached, on whatever would be
-//! through it tau later, so that speed alone cannot carry a point through. The step solves for the
-//! force and the motion together: whatever the stiffness, the matrix stays positive.
+//! through it tau later, so that speed alone cannot carry a point through. The step
+//! solves for the force and the motion together: whatever the stiffness, the matrix
+//! stays positive.
 //!
 //! The surface is replaced by its tangent plane where the point's path of this step
 //! first meets it; the path is followed from outside in strides of the distance left.

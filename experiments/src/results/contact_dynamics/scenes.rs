@@ -24,16 +24,17 @@ pub(super) struct TouchScene {
     pub horizon_s: f64,
 }
 
-/// Of the ranges' lower half in stiffness; limp with a heavy lead, stiff with a heavier one, limp
-/// with a light one. In the order of [`shared_types::rope::RANGES`].
+/// Limp, with a heavy lead. Numbers in the order of [`shared_types::rope::RANGES`].
 fn limp() -> RopeParams {
     RopeParams::from_array([22.0, 0.55, 0.005, 0.08, 0.006, 0.05, 0.08, 0.025, 0.8])
 }
 
+/// Stiffer, with a heavier one.
 fn stiff() -> RopeParams {
     RopeParams::from_array([24.0, 0.50, 0.02, 0.3, 0.008, 0.06, 0.12, 0.03, 0.8])
 }
 
+/// Limp, with a light one.
 fn light() -> RopeParams {
     RopeParams::from_array([20.0, 0.60, 0.004, 0.06, 0.005, 0.04, 0.04, 0.02, 0.9])
 }
