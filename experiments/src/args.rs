@@ -79,6 +79,28 @@ pub enum ResultCommand {
     /// a9c478d6, folder dataset/pool-noodle), which are not part of this program: fetch them. Takes
     /// about a minute; interrupted, it keeps nothing.
     RealDlo(RealDloArgs),
+    /// Motion of ropes that touch a board, a domino, a wall or a floor, beside MuJoCo's.
+    ///
+    /// Needs a Python with MuJoCo, named by WAG_MUJOCO_PYTHON. Takes minutes; interrupted, it keeps
+    /// nothing.
+    ContactDynamics(ContactDynamicsArgs),
+}
+
+/// Arguments of `experiments contact-dynamics`.
+#[derive(Debug, Args)]
+pub struct ContactDynamicsArgs {
+    /// A scene by name; again for more. Default: all ten.
+    #[arg(long = "scene", value_name = "NAME")]
+    pub scenes: Vec<String>,
+    /// Step of the simulator (ms), at most that of throws, the default.
+    #[arg(long, default_value_t = 0.5, value_name = "MS", value_parser = step_ms)]
+    pub step_ms: f64,
+    /// Threads; the result does not depend on them.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: u16,
+    /// Result file (JSON).
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// Arguments of `experiments real-dlo`.
@@ -239,6 +261,14 @@ pub enum KindName {
     Ordinary,
     /// With a rope in the wall's colour, somebody who walks by, cables, or glare.
     Hard,
+}
+
+/// A step at which contacts are trusted.
+fn step_ms(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(step_ms) if (0.01..=0.5).contains(&step_ms) => Ok(step_ms),
+        _ => Err(format!("`{text}` is not a step from 0.01 to 0.5 ms")),
+    }
 }
 
 /// `7` or `1-20`.

@@ -5,6 +5,7 @@
 
 mod ablated_wiggles;
 mod checkpoint;
+mod contact_dynamics;
 pub(crate) mod experiment;
 mod fidelity;
 mod importance;
@@ -36,6 +37,7 @@ pub fn run(command: &ResultCommand) -> Outcome<Option<Value>> {
         ResultCommand::OtherReality(args) => return other_reality::run(args),
         ResultCommand::FullPipeline(args) => return other_reality::run_full(args),
         ResultCommand::RealDlo(args) => return real_dlo::run(args),
+        ResultCommand::ContactDynamics(args) => return contact_dynamics::run(args),
         ResultCommand::Sysid(args) => ("sysid", args, sysid::run),
         ResultCommand::MotionFidelity(args) => ("motion-fidelity", args, fidelity::run),
         ResultCommand::SysidOod(args) => ("sysid-ood", args, ood::run),

@@ -29,7 +29,7 @@ use crate::state::RopeLanes;
 use body::Body;
 use rocking::RockingBlocks;
 use shared_types::RopeParams;
-use touch::Touch;
+use touch::{RETARDATION_S, Touch};
 
 /// Steps between two looks at how far everything is.
 pub(crate) const LOOK_PERIOD: usize = 8;
@@ -104,7 +104,8 @@ impl<V: Lanes> Contacts<V> {
             reach: V::splat(0.0),
             radius,
             lead_radius,
-            max_step: V::splat(max_step_s),
+            // Contacts act on what is through the surface that much later.
+            max_step: V::splat(max_step_s.max(RETARDATION_S)),
             imminent: V::splat(0.0),
             domino,
         }

@@ -1,10 +1,12 @@
 //! One point of the rope against one obstacle.
 //!
-//! The normal force is `k (depth + tau d/dt depth)+` at the end of the step, with tau
-//! the step itself: a stiff spring so damped that the contact is inelastic. It acts
-//! already before the surface is reached, on whatever would be through it a step
-//! later, so that speed alone cannot carry a point through. The step solves for the
-//! force and the motion together: whatever the stiffness, the matrix stays positive.
+//! The normal force is `k (depth + tau d/dt depth)+` at the end of the step: a stiff
+//! spring so damped that the contact is inelastic. A tau shorter than the spring's own
+//! time would let it bounce, so it does not shrink with steps shorter than those of
+//! throws. The force acts already before the surface is reached, on whatever would be
+//! through it tau later, so that speed alone cannot carry a point through. The step
+//! solves for the force and the motion together: whatever the stiffness, the matrix
+//! stays positive.
 //!
 //! The surface is replaced by its tangent plane where the point's path of this step
 //! first meets it; the path is followed from outside in strides of the distance left.
@@ -26,10 +28,18 @@ const STRIDES: usize = 4;
 /// Gap that a rope approaching an obstacle may have at the start of a step without
 /// forgetting its accelerations (m).
 const IMMINENT_M: f64 = 5e-4;
+/// Least retardation tau (s): the step of throws.
+pub(super) const RETARDATION_S: f64 = 5e-4;
 /// Stiffness along the surface, as part of that across it.
 const TANGENTIAL_PART: f64 = 0.1;
 /// Lengths and speeds below which a direction has no meaning.
 const TINY: f64 = 1e-12;
+
+/// The retardation tau of steps of `h` (s).
+#[inline(always)]
+fn retardation<V: Lanes>(h: V) -> V {
+    h.max(V::splat(RETARDATION_S))
+}
 
 /// Memory of one contact point, and what the step must know about it.
 #[derive(Clone, Copy)]
@@ -126,11 +136,12 @@ impl<V: Lanes> Touch<V> {
         self.velocity = v_surface.sub(body.frame.velocity_at(x.add(self.surface)));
         self.gap = gap;
         let rate = normal.dot(self.velocity);
-        let ahead = rate.fma(h, gap);
+        let tau = retardation(h);
+        let ahead = rate.fma(tau, gap);
         let stiffness = V::select_less(zero, point.may_touch, point.stiffness, zero);
         self.stiffness = V::select_less(ahead, zero, stiffness, zero);
         self.share = one;
-        let later = rate.fma(h + h + h, gap);
+        let later = rate.fma(tau + h + h, gap);
         let imminent = V::select_less(later, V::splat(IMMINENT_M), one, zero);
         V::select_less(zero, point.may_touch, imminent, zero)
     }
@@ -152,26 +163,26 @@ impl<V: Lanes> Touch<V> {
         yielding: Option<V>,
     ) -> Load<V> {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let h = scheme.h;
+        let (h, tau) = (scheme.h, retardation(scheme.h));
         let n = self.normal;
         let rate = n.dot(self.velocity);
         let shift = scheme.correct_half_phi + scheme.correct_half_phi;
-        let normal_resistance = self.stiffness * scheme.correct_w.fma(h, shift);
+        let normal_resistance = self.stiffness * scheme.correct_w.fma(tau, shift);
         if let Some(mobility) = yielding {
             self.share = normal_resistance.fma(mobility, one).recip();
         }
         let normal_resistance = normal_resistance * self.share;
-        let push = -(self.stiffness * self.share) * rate.fma(h, self.gap);
+        let push = -(self.stiffness * self.share) * rate.fma(tau, self.gap);
 
         let slide = n.scale_sub(rate, self.velocity);
         let stretch = self.stretch;
         let stretch = n.scale_sub(n.dot(stretch), stretch);
         let along = self.stiffness * V::splat(TANGENTIAL_PART);
-        let pull = slide.scale_add(h + h, stretch).scale(along);
+        let pull = slide.scale_add(h + tau, stretch).scale(along);
         let limit = friction * self.force;
         let grip = (limit * pull.norm().max(V::splat(TINY)).recip()).min(one);
         let grip = V::select_less(zero, self.stiffness, grip, zero);
-        let tangential_resistance = grip * along * scheme.correct_w * (h + h);
+        let tangential_resistance = grip * along * scheme.correct_w * (h + tau);
 
         let force = n.scale_add(push, pull.scale(-grip));
         let resistance = Sym3::diagonal(tangential_resistance)
@@ -200,7 +211,7 @@ impl<V: Lanes> Touch<V> {
         let change = rate - n.dot(self.velocity);
         let shift = scheme.correct_half_phi + scheme.correct_half_phi;
         self.gap = (shift * scheme.correct_w.recip()).fma(change, self.gap);
-        let force = -(self.stiffness * self.share) * rate.fma(h, self.gap);
+        let force = -(self.stiffness * self.share) * rate.fma(retardation(h), self.gap);
         self.force = V::select_less(zero, self.stiffness, force.max(zero), zero);
 
         let slide = n.scale_sub(rate, v);

@@ -32,7 +32,7 @@ pub(super) struct OtherRope {
 
 /// A Python that has MuJoCo.
 #[derive(Debug, Clone)]
-pub(super) struct Mujoco(OsString);
+pub(in crate::results) struct Mujoco(OsString);
 
 #[derive(Serialize)]
 struct Request<'a> {
@@ -63,7 +63,7 @@ impl Mujoco {
     /// Positions of `nodes` points of a rope, uniform in arc length from clamp to tip, whose
     /// attach frame moves as told; time by time. The rope hung at rest before, in one of the
     /// shapes that friction holds; which one, `seed` says.
-    pub fn simulate(
+    pub(super) fn simulate(
         &self,
         rope: &OtherRope,
         motion: impl Fn(f64) -> FrameMotion,
@@ -91,7 +91,7 @@ impl Mujoco {
                 nodes,
                 times_s: times_s.clone(),
             };
-            self.ask(&serde_json::to_vec(&request)?)
+            self.ask(SCRIPT, &serde_json::to_vec(&request)?)
         };
         let blew_up = |found: &anyhow::Result<_>| {
             let why = found.as_ref().err().map(ToString::to_string);
@@ -115,10 +115,24 @@ impl Mujoco {
         Ok(points.map(Vector3::from_column_slice).collect())
     }
 
-    fn ask(&self, request: &[u8]) -> anyhow::Result<Vec<u8>> {
+    /// The Python, or nothing where there is none: said aloud, and a failure in CI.
+    #[cfg(test)]
+    pub fn for_tests() -> Option<Self> {
+        match Self::from_environment() {
+            Ok(mujoco) => Some(mujoco),
+            Err(missing) if std::env::var_os("CI").is_some() => panic!("{missing}"),
+            Err(missing) => {
+                eprintln!("skipped: {missing}");
+                None
+            }
+        }
+    }
+
+    /// What a script answers to a request.
+    pub fn ask(&self, script: &str, request: &[u8]) -> anyhow::Result<Vec<u8>> {
         use std::io::Write;
         let mut child = Command::new(&self.0)
-            .args(["-c", SCRIPT])
+            .args(["-c", script])
             // Its matrices are small; threads would only get in each other's way.
             .env("OPENBLAS_NUM_THREADS", "1")
             .stdin(Stdio::piped())
@@ -146,7 +160,7 @@ impl Mujoco {
 }
 
 /// Origin, then attitude as a quaternion, scalar first.
-fn pose(frame: &FrameMotion) -> [f64; 7] {
+pub(in crate::results) fn pose(frame: &FrameMotion) -> [f64; 7] {
     let attitude = Rotation3::from_matrix_unchecked(frame.r);
     let q = UnitQuaternion::from_rotation_matrix(&attitude);
     let p = frame.p_m;
@@ -161,18 +175,6 @@ mod tests {
     use rope_sim::{AttachMotion, Candidate, Precision, SimOptions, roll_out};
     use shared_types::{AirDrag, BendingFriction, RopeExtras};
 
-    /// The Python, or nothing where there is none: said aloud, and a failure in CI.
-    fn mujoco() -> Option<Mujoco> {
-        match Mujoco::from_environment() {
-            Ok(mujoco) => Some(mujoco),
-            Err(missing) if std::env::var_os("CI").is_some() => panic!("{missing}"),
-            Err(missing) => {
-                eprintln!("skipped: {missing}");
-                None
-            }
-        }
-    }
-
     fn plain(params: RopeParams, refinement: u32) -> OtherRope {
         OtherRope {
             params,
@@ -185,7 +187,9 @@ mod tests {
     /// MuJoCo has the equations of motion, and none of ours; drag is the script's own.
     #[test]
     fn what_both_know_is_the_same_rope() {
-        let Some(mujoco) = mujoco() else { return };
+        let Some(mujoco) = Mujoco::for_tests() else {
+            return;
+        };
         let times = FrameTimes {
             first_s: 0.0,
             period_s: 0.02,
@@ -228,7 +232,9 @@ mod tests {
     /// it: off its equilibrium, each time elsewhere.
     #[test]
     fn friction_dissipates_and_holds() {
-        let Some(mujoco) = mujoco() else { return };
+        let Some(mujoco) = Mujoco::for_tests() else {
+            return;
+        };
         let rope = RopeParams {
             joint_damping_nms_per_rad: 5e-4,
             ..trial_rope(1, 0)

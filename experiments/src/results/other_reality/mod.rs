@@ -3,7 +3,7 @@
 //! in MuJoCo.
 
 mod case;
-mod child;
+pub(super) mod child;
 mod full;
 mod kinds;
 mod rows;
