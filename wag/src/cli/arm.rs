@@ -1,10 +1,11 @@
 //! The commands that move an arm, the one that simulates it, and those that measure its
 //! control loop.
 
-use super::values::host;
+use super::values::{TASKS, host, one_of};
 use super::{CameraArgs, Point};
 use clap::{ArgGroup, Args, ValueEnum};
 use cli_output::seed;
+use shared_types::Task;
 use std::net::IpAddr;
 use std::path::PathBuf;
 
@@ -192,6 +193,9 @@ pub struct RigArgs {
     /// Publish the simulated camera in this shared-memory domain (needs --rope).
     #[arg(long, value_name = "DOMAIN")]
     pub camera: Option<String>,
+    /// What throws will be for: the camera stands so that it sees that.
+    #[arg(long, default_value = "strike", value_parser = one_of(TASKS))]
+    pub task: Task,
     /// Seed of the hidden rope and the noise.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,

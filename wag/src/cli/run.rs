@@ -1,22 +1,11 @@
 //! Arguments of what goes from wiggle to throw: run, demo.
 
-use super::values::{Colour, mass_kg, one_of};
+use super::values::{Colour, TASKS, mass_kg, one_of};
 use super::{ArmArgs, CameraArgs, Point};
 use clap::{ArgGroup, Args};
 use cli_output::seed;
 use shared_types::Task;
 use std::path::PathBuf;
-
-/// What throws are for, by name.
-const TASKS: [(&str, &str, Task); 3] = [
-    ("strike", "The tip passes through the target", Task::Strike),
-    (
-        "lob",
-        "The tip fells a domino on a board and stays there",
-        Task::Lob,
-    ),
-    ("drape", "The rope comes to hang over a wall", Task::Drape),
-];
 
 #[derive(Debug, Args)]
 #[command(

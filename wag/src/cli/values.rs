@@ -1,6 +1,7 @@
 //! Values on the command line, with what they may be.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use shared_types::Task;
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::str::FromStr;
 
@@ -113,3 +114,14 @@ impl FromStr for Colour {
         listed(text, "three whole numbers R,G,B from 0 to 255", |_| true).map(Self)
     }
 }
+
+/// What throws are for, by name.
+pub const TASKS: [(&str, &str, Task); 3] = [
+    ("strike", "The tip passes through the target", Task::Strike),
+    (
+        "lob",
+        "The tip fells a domino on a board and stays there",
+        Task::Lob,
+    ),
+    ("drape", "The rope comes to hang over a wall", Task::Drape),
+];

@@ -9,6 +9,7 @@ use cli_output::{
 use rig_sim::{RigConfig, run_announced};
 use run_log::files;
 use serde_json::{Value, json};
+use shared_types::Task;
 use shared_types::ipc::DomainSweep;
 use std::net::IpAddr;
 use std::time::Duration;
@@ -50,6 +51,7 @@ pub fn run(args: &RigArgs) -> Outcome<Option<Value>> {
                 cell,
                 ..RigConfig::default()
             };
+            config = config.seeing(args.task);
             config.camera.enabled = args.camera.is_some();
             if rope != "random" {
                 config.rope = Some(files::read_rope(rope.as_ref()).or_input()?);
@@ -57,7 +59,8 @@ pub fn run(args: &RigArgs) -> Outcome<Option<Value>> {
             // Goes last: nothing of the domain stays once the rig is gone.
             let _sweep = DomainSweep::new(&config.domain);
             let camera = args.camera.as_deref();
-            let announce = |ports| announce(config.bind, ports, camera);
+            let films = camera.map(|domain| (args.task, domain));
+            let announce = |ports| announce(config.bind, ports, films);
             run_announced(&config, interrupted(), announce).map_err(Failure::of_server)?;
         }
     }
@@ -66,7 +69,7 @@ pub fn run(args: &RigArgs) -> Outcome<Option<Value>> {
 
 /// Says where the arm listens as soon as it does: whoever starts a rig waits for
 /// its ports, not for its end.
-fn announce(bind: IpAddr, ports: ArmPorts, camera: Option<&str>) {
+fn announce(bind: IpAddr, ports: ArmPorts, films: Option<(Task, &str)>) {
     output::object(&json!({
         "ok": true, "command": "rig", "bind": bind,
         "command_port": ports.command, "report_ports": ports.reports,
@@ -80,8 +83,11 @@ fn announce(bind: IpAddr, ports: ArmPorts, camera: Option<&str>) {
         "--arm {bind} --command-port {} --report-port {joints} --status-port {status}",
         ports.command
     );
-    match camera {
-        Some(domain) => println!("from wiggle to throw: wag run strike {arm} --camera {domain}"),
+    match films {
+        Some((task, domain)) => println!(
+            "from wiggle to throw: wag run {} {arm} --camera {domain}",
+            task.name()
+        ),
         None => println!("drive it with {arm}"),
     }
 }
