@@ -76,7 +76,20 @@ fn board_with_domino(facing_rad: f64) -> Scene {
 
 /// All, in the order of the table.
 pub(super) fn all() -> Vec<TouchScene> {
-    let scene = |name, rope, scene, start_m, ramps: &[Ramp], horizon_s| TouchScene {
+    let mut all = on_the_board();
+    all.extend(on_wall_and_floor());
+    all
+}
+
+fn scene(
+    name: &'static str,
+    rope: RopeParams,
+    scene: Scene,
+    start_m: [f64; 3],
+    ramps: &[Ramp],
+    horizon_s: f64,
+) -> TouchScene {
+    TouchScene {
         name,
         rope,
         scene,
@@ -85,7 +98,10 @@ pub(super) fn all() -> Vec<TouchScene> {
             ramps: ramps.to_vec(),
         },
         horizon_s,
-    };
+    }
+}
+
+fn on_the_board() -> Vec<TouchScene> {
     let ramp = Ramp::new;
     vec![
         scene(
@@ -129,6 +145,12 @@ pub(super) fn all() -> Vec<TouchScene> {
             ],
             2.2,
         ),
+    ]
+}
+
+fn on_wall_and_floor() -> Vec<TouchScene> {
+    let ramp = Ramp::new;
+    vec![
         scene(
             "drape",
             limp(),
