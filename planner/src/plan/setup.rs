@@ -6,7 +6,10 @@ use super::waypoints::{WAYPOINTS, WaypointSpace};
 use super::{
     PlanError, PlanRequest, ThrowOutcome, ThrowSimulator, ThrowTask, simulator_for, start_pose_for,
 };
+use crate::collide::Block;
+use arm_model::geometry::Capsule;
 use arm_model::{JointTrajectory, JointVector};
+use nalgebra::Vector3;
 use shared_types::RopeParams;
 
 /// A point of the search's space with its trajectory.
@@ -91,6 +94,19 @@ impl<'a> Setup<'a> {
             following: request.following.clone(),
             ..simulator_for(task, &request.rope, &request.cell, &request.options)
         };
+        let clamp_m = request.cell.pole.attach_pose(&space.start).0;
+        let hanging = Capsule {
+            a_m: clamp_m,
+            b_m: clamp_m - Vector3::z() * request.rope.length_m,
+            radius_m: request.rope.lead_radius_m,
+        };
+        let is_free = |block: &Block| block.gap_m(&hanging) > 0.0;
+        if !simulator.keep_clear.iter().all(is_free) {
+            return Err(PlanError::Target(format!(
+                "what the {} is thrown at would stand where the rope hangs before the throw: move the target farther from the arm",
+                request.goal.kind().name()
+            )));
+        }
         let searching = ThrowSimulator {
             step_s: request.options.search_step_s.max(simulator.step_s),
             ..simulator.clone()

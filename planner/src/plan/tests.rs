@@ -295,6 +295,21 @@ fn warm_starts_are_executable_at_any_bearing() {
     }
 }
 
+#[test]
+fn bodies_where_the_rope_hangs_are_refused_in_words() {
+    for (kind, near_m, far_m) in [(Task::Lob, 0.78, 0.86), (Task::Drape, 0.66, 0.75)] {
+        let of = |x_m: f64| {
+            let goal = PlannerConfig::default().goal(kind, [x_m, 0.0, 0.2]);
+            PlanRequest::new(goal, &random_rope(3), PlanOptions::default())
+        };
+        let (near, far) = (of(near_m), of(far_m));
+        let refused = Setup::new(near.goal.task(), &near).map(|_| ()).unwrap_err();
+        let said = refused.to_string();
+        assert!(refused.is_input() && said.contains(kind.name()), "{said}");
+        assert!(Setup::new(far.goal.task(), &far).is_ok(), "{kind:?}");
+    }
+}
+
 /// What a rope on the board, or over the wall, is said to have done.
 #[test]
 fn lobs_and_drapes_are_judged_by_their_conditions() {

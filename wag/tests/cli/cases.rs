@@ -185,7 +185,6 @@ pub(crate) const SIM_ROPE: &str = "
 
 /// What is asked for correctly and cannot be done: exit code 1.
 pub(crate) const FAILED: &str = "
-    demo --task lob => lob | not implemented
     plan strike --rope unconfirmed.toml --target 0.8,0,0.3 --out p.json => unconfirmed | end is not confirmed | --accept-unconfirmed
     throw unconfirmed.json --accept-unconfirmed --arm 127.0.0.1 --command-port 9 => warning: the track is unconfirmed | cannot connect | 127.0.0.1:9
     throw unconfirmed.json --arm 192.0.2.1 => unconfirmed | end is not confirmed | --accept-unconfirmed";
