@@ -1,11 +1,15 @@
 //! Pictures for people: keypoints over frames, and the strobe picture of a throw.
 
+mod marks;
+mod picture;
 mod strobe;
+mod throw;
 
+pub use picture::Picture;
 pub use strobe::{still_scene, strobe};
+pub(crate) use throw::{Strike, throw_picture};
 
-use crate::whole_file::write_whole;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use shared_types::KeypointTrack;
 use shared_types::keypoints::TrackedFrame;
@@ -28,167 +32,44 @@ pub enum OverlayError {
     Input(&'static str),
 }
 
-/// A colour picture, 3 bytes a pixel.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Picture {
-    /// Pixels per row.
-    pub width_px: usize,
-    /// Rows.
-    pub height_px: usize,
-    /// Packed RGB.
-    pub rgb: Vec<u8>,
-}
-
-impl Picture {
-    /// Picture of one image.
-    #[must_use]
-    pub fn of(frame: &ImageFrame) -> Self {
-        Self {
-            width_px: frame.width_px,
-            height_px: frame.height_px,
-            rgb: frame.to_rgb(),
-        }
-    }
-
-    /// Black picture.
-    #[must_use]
-    pub fn black(width_px: usize, height_px: usize) -> Self {
-        Self {
-            width_px,
-            height_px,
-            rgb: vec![0; width_px * height_px * 3],
-        }
-    }
-
-    fn set(&mut self, u: i64, v: i64, colour: [u8; 3]) {
-        let (Ok(u), Ok(v)) = (usize::try_from(u), usize::try_from(v)) else {
-            return;
-        };
-        if u < self.width_px && v < self.height_px {
-            let at = (v * self.width_px + u) * 3;
-            self.rgb[at..at + 3].copy_from_slice(&colour);
-        }
-    }
-
-    fn cross(&mut self, [u, v]: [f64; 2], arm_px: i64, colour: [u8; 3]) {
-        let (u, v) = (u.round() as i64, v.round() as i64);
-        for d in -arm_px..=arm_px {
-            self.set(u + d, v, colour);
-            self.set(u, v + d, colour);
-        }
-    }
-
-    /// A line one pixel wide.
-    fn line(&mut self, from: [f64; 2], to: [f64; 2], colour: [u8; 3]) {
-        let span = (to[0] - from[0]).abs().max((to[1] - from[1]).abs());
-        if !span.is_finite() || span > 1e5 {
-            return;
-        }
-        let steps = span.ceil().max(1.0) as i64;
-        for i in 0..=steps {
-            let a = i as f64 / steps as f64;
-            let at = |k: usize| (from[k] + a * (to[k] - from[k])).round() as i64;
-            self.set(at(0), at(1), colour);
-        }
-    }
-
-    /// Copies another picture to `(left, top)`; what sticks out is cut off.
-    fn paste(&mut self, other: &Self, left: usize, top: usize) {
-        let width = other.width_px.min(self.width_px.saturating_sub(left));
-        for v in 0..other.height_px.min(self.height_px.saturating_sub(top)) {
-            let from = v * other.width_px * 3;
-            let to = ((top + v) * self.width_px + left) * 3;
-            self.rgb[to..to + width * 3].copy_from_slice(&other.rgb[from..from + width * 3]);
-        }
-    }
-
-    /// The picture made smaller by a whole factor, each pixel the mean of those it
-    /// stands for; rows and columns left over are cut off.
-    #[must_use]
-    pub fn shrunk(&self, factor: usize) -> Self {
-        let factor = factor.max(1);
-        let mut small = Self::black(self.width_px / factor, self.height_px / factor);
-        let count = factor * factor;
-        for v in 0..small.height_px {
-            for u in 0..small.width_px {
-                let mut sum = [0; 3];
-                for row in v * factor..(v + 1) * factor {
-                    let from = (row * self.width_px + u * factor) * 3;
-                    for pixel in self.rgb[from..from + factor * 3].chunks_exact(3) {
-                        for (sum, &c) in sum.iter_mut().zip(pixel) {
-                            *sum += usize::from(c);
-                        }
-                    }
-                }
-                let at = (v * small.width_px + u) * 3;
-                for (to, sum) in small.rgb[at..at + 3].iter_mut().zip(sum) {
-                    *to = u8::try_from(sum / count).unwrap_or(u8::MAX);
-                }
-            }
-        }
-        small
-    }
-
-    /// The picture as a PNG file's bytes.
-    ///
-    /// # Errors
-    /// The picture is too large for one.
-    pub fn to_png(&self) -> Result<Vec<u8>, OverlayError> {
-        let large = OverlayError::Input("the picture is too large for a PNG");
-        let (Ok(width), Ok(height)) = (u32::try_from(self.width_px), u32::try_from(self.height_px))
-        else {
-            return Err(large);
-        };
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, width, height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let written = encoder
-            .write_header()
-            .and_then(|mut writer| writer.write_image_data(&self.rgb));
-        written.map_err(|_e| large).map(|()| bytes)
-    }
-
-    /// Writes a PNG file, whole or not at all.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn write_png(&self, path: &Path) -> Result<(), OverlayError> {
-        let bytes = self.to_png()?;
-        write_whole(path, &bytes).map_err(|e| OverlayError::Write {
-            path: path.to_owned(),
-            reason: e.to_string(),
-        })
-    }
-}
-
 /// Widest picture in a contact sheet (px): a dozen stay around a megabyte.
 const SHEET_WIDTH_PX: usize = 340;
+/// The part of an image that is shown is at least so many times as large as where the
+/// keypoints are.
+const ROOM: f64 = 1.4;
+/// Radius of a keypoint's dot, and least distance between two dots (px).
+const DOT_PX: f64 = 2.6;
+const DOTS_APART_PX: f64 = 9.0;
+/// Colours of keypoints, and of keypoints where the rope is lost.
+const FOUND: [u8; 3] = [0, 255, 255];
+const LOST: [u8; 3] = [255, 0, 0];
 
 /// A frame with its keypoints, red where the rope is lost.
 pub(crate) fn drawn(frame: &ImageFrame, tracked: &TrackedFrame) -> Picture {
-    draw_rope(Picture::of(frame), tracked, 1)
-}
-
-fn draw_rope(mut picture: Picture, tracked: &TrackedFrame, factor: usize) -> Picture {
-    // The middle of pixel 0 stands for those of pixels 0 to factor - 1.
-    let small = |x: f64| (x + 0.5) / factor as f64 - 0.5;
-    let points: Vec<[f64; 2]> = tracked.points.iter().map(|p| p.map(small)).collect();
-    let line = if tracked.lost {
-        [255, 0, 0]
-    } else {
-        [0, 255, 255]
-    };
-    for pair in points.windows(2) {
-        picture.line(pair[0], pair[1], line);
-    }
-    for p in points {
-        picture.cross(p, 1, [255, 0, 255]);
-    }
+    let mut picture = Picture::of(frame);
+    draw_rope(&mut picture, tracked, &|p| p);
     picture
 }
 
-/// Contact sheet of chosen frames, `columns` a row, made smaller, with their keypoints drawn.
+/// Hollow dots with gaps between them, so that the rope that they are to lie on stays
+/// visible; `place` turns pixels of the camera into those of the picture.
+fn draw_rope(picture: &mut Picture, tracked: &TrackedFrame, place: &dyn Fn([f64; 2]) -> [f64; 2]) {
+    let colour = if tracked.lost { LOST } else { FOUND };
+    let mut last: Option<[f64; 2]> = None;
+    let count = tracked.points.len();
+    for (i, p) in tracked.points.iter().enumerate() {
+        let p = place(*p);
+        let is_end = i == 0 || i + 1 == count;
+        let apart = |q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+        if is_end || last.is_none_or(|q| apart(q) >= DOTS_APART_PX) {
+            picture.ring(p, DOT_PX, colour);
+            last = Some(p);
+        }
+    }
+}
+
+/// Contact sheet of chosen frames, `columns` a row, each with its keypoints and its time: the
+/// part of the image in which the rope moves, the same in all of them.
 ///
 /// # Errors
 /// No frame chosen.
@@ -198,15 +79,90 @@ pub fn keypoint_sheet(
     chosen: &[usize],
     columns: usize,
 ) -> Result<Picture, OverlayError> {
-    let pictures: Vec<Picture> = chosen
+    let shown: Vec<(&ImageFrame, &TrackedFrame)> = chosen
         .iter()
         .filter_map(|&i| Some((frames.get(i)?, track.frames.get(i)?)))
-        .map(|(frame, tracked)| {
-            let factor = frame.width_px.div_ceil(SHEET_WIDTH_PX).max(1);
-            draw_rope(Picture::of(frame).shrunk(factor), tracked, factor)
-        })
         .collect();
-    contact_sheet(&pictures, columns)
+    let points = shown.iter().flat_map(|(_, tracked)| &tracked.points);
+    let Some((first, _)) = shown.first() else {
+        return contact_sheet(&[], columns);
+    };
+    let part = Part::around(points, [first.width_px, first.height_px]);
+    let picture = |(frame, tracked): &(&ImageFrame, &TrackedFrame)| {
+        let mut picture = part.of(&Picture::of(frame));
+        draw_rope(&mut picture, tracked, &|p| part.place(p));
+        picture.text([4, 4], &format!("{:.2} s", tracked.t_s), 2);
+        picture
+    };
+    contact_sheet(&shown.iter().map(picture).collect::<Vec<_>>(), columns)
+}
+
+/// A part of an image, made smaller by a whole factor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Part {
+    left: usize,
+    top: usize,
+    size: [usize; 2],
+    factor: usize,
+}
+
+impl Part {
+    /// The part around points (px) that has the sides of the image `size` and, as often as it
+    /// has to be halved, thirded, ..., the width of a picture in a sheet.
+    fn around<'a>(points: impl Iterator<Item = &'a [f64; 2]>, size: [usize; 2]) -> Self {
+        let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for p in points.filter(|p| p[0].is_finite() && p[1].is_finite()) {
+            for (end, x) in ends.iter_mut().zip(p) {
+                *end = [end[0].min(*x), end[1].max(*x)];
+            }
+        }
+        let most = size[0].div_ceil(SHEET_WIDTH_PX).max(1);
+        let sides = |factor: usize| {
+            let width = (SHEET_WIDTH_PX * factor).min(size[0]);
+            [
+                width,
+                (width * size[1]).div_ceil(size[0].max(1)).min(size[1]),
+            ]
+        };
+        // What is around the rope belongs to the picture, too.
+        let holds = |factor: &usize| {
+            let side = sides(*factor);
+            (0..2).all(|k| ROOM * (ends[k][1] - ends[k][0]) <= side[k] as f64)
+        };
+        let factor = (1..most).find(holds).unwrap_or(most);
+        let sides = sides(factor);
+        let begin = |k: usize| {
+            let middle = f64::midpoint(ends[k][0], ends[k][1]);
+            let begin = (middle - sides[k] as f64 / 2.0).max(0.0);
+            // Without a point there is no middle, and the part begins at the edge.
+            let begin = if begin.is_finite() { begin as usize } else { 0 };
+            begin.min(size[k] - sides[k])
+        };
+        Self {
+            left: begin(0),
+            top: begin(1),
+            size: sides,
+            factor,
+        }
+    }
+
+    fn of(&self, picture: &Picture) -> Picture {
+        let mut part = Picture::black(self.size[0], self.size[1]);
+        for v in 0..self.size[1] {
+            let from = ((self.top + v) * picture.width_px + self.left) * 3;
+            let to = v * self.size[0] * 3;
+            part.rgb[to..to + self.size[0] * 3]
+                .copy_from_slice(&picture.rgb[from..from + self.size[0] * 3]);
+        }
+        part.shrunk(self.factor)
+    }
+
+    /// A pixel of the image as one of the part.
+    fn place(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        // The middle of pixel 0 stands for those of pixels 0 to factor - 1.
+        let small = |x: f64, from: usize| (x - from as f64 + 0.5) / self.factor as f64 - 0.5;
+        [small(u, self.left), small(v, self.top)]
+    }
 }
 
 /// Pictures in rows, all of the first one's size.
@@ -233,26 +189,6 @@ mod tests {
     }
 
     #[test]
-    fn drawing_stays_inside() {
-        let mut picture = Picture::of(&grey(0));
-        picture.line([-20.0, 1.0], [20.0, 1.0], [255, 0, 0]);
-        picture.cross([7.0, 3.0], 3, [0, 255, 0]);
-        let red = picture.rgb.chunks(3).filter(|p| p[0] == 255).count();
-        assert_eq!(red, 7, "a row of eight, one under the cross");
-    }
-
-    #[test]
-    fn a_smaller_picture_holds_the_means() {
-        let mut picture = Picture::of(&grey(100));
-        picture.set(0, 0, [0, 200, 100]);
-        let small = picture.shrunk(2);
-        assert_eq!((small.width_px, small.height_px), (4, 2));
-        assert_eq!(small.rgb[..6], [75, 125, 100, 100, 100, 100]);
-        assert_eq!(picture.shrunk(3).width_px, 2);
-        assert_eq!(picture.shrunk(1), picture);
-    }
-
-    #[test]
     fn sheets_tile_and_png_reads_back() {
         let pictures = [1, 2, 3].map(|level| Picture::of(&grey(level)));
         let sheet = contact_sheet(&pictures, 2).unwrap();
@@ -261,5 +197,47 @@ mod tests {
         let file = std::io::Cursor::new(sheet.to_png().unwrap());
         let info = png::Decoder::new(file).read_info().unwrap().info().size();
         assert_eq!(info, (16, 8));
+    }
+
+    fn tracked(points: &[[f64; 2]], t_s: f64) -> TrackedFrame {
+        TrackedFrame {
+            t_s,
+            points: points.to_vec(),
+            confidence: vec![1.0; points.len()],
+            lost: false,
+        }
+    }
+
+    #[test]
+    fn a_sheet_shows_the_part_where_the_rope_moves_as_large_as_it_can() {
+        let size = [680, 340];
+        let near = [[400.0, 200.0], [420.0, 260.0]];
+        let part = Part::around(near.iter(), size);
+        assert_eq!((part.factor, part.size), (1, [340, 170]));
+        assert_eq!((part.left, part.top), (240, 145));
+        assert_eq!(part.place([400.0, 200.0]), [160.0, 55.0]);
+        // At the edge the part ends with the image, and a long rope is made smaller.
+        let edge = [[679.0, 339.0]];
+        let part = Part::around(edge.iter(), size);
+        assert_eq!((part.left, part.top), (340, 170));
+        let long = [[10.0, 10.0], [600.0, 300.0]];
+        let part = Part::around(long.iter(), size);
+        assert_eq!((part.factor, part.left, part.top), (2, 0, 0));
+        assert_eq!(part.place([0.5, 0.5]), [0.0, 0.0]);
+        assert_eq!(Part::around([].iter(), size).left, 0);
+    }
+
+    #[test]
+    fn keypoints_leave_the_rope_in_sight() {
+        let frame = ImageFrame::grey([64, 64], 100);
+        let points: Vec<[f64; 2]> = (0..27).map(|i| [30.0, 5.0 + 2.0 * f64::from(i)]).collect();
+        let picture = drawn(&frame, &tracked(&points, 0.0));
+        let at = |u: usize, v: usize| &picture.rgb[(v * 64 + u) * 3..(v * 64 + u) * 3 + 3];
+        // On the rope itself most pixels are the film's own.
+        let seen = (5..58).filter(|v| at(30, *v) == [100, 100, 100]).count();
+        assert!(seen > 30, "{seen} of 53");
+        assert_eq!(at(30, 5), [100, 100, 100], "a dot is hollow");
+        let dots = picture.rgb.chunks(3).filter(|p| *p == FOUND).count();
+        assert!(dots > 50, "{dots} pixels");
     }
 }

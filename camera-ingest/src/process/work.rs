@@ -3,23 +3,23 @@
 use super::answer::answer;
 use super::keep::Recording;
 use crate::frame::ImageFrame;
-use crate::overlay::{OverlayError, keypoint_sheet, still_scene, strobe};
+use crate::overlay::{OverlayError, Strike, keypoint_sheet, throw_picture};
+use crate::score::Score;
 use crate::source::{FrameSource, StereoSource};
 use crate::track::TrackResult;
 use arm_model::{JointVector, Pole};
+use nalgebra::Vector3;
 use rope_sim::MeasuredArm;
-use shared_types::MonotonicNs;
 use shared_types::ipc::KeypointPublisher;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, Progress, RopeAppearance};
 use shared_types::ipc::rpc::Call;
 use shared_types::keypoints::KeypointFrame;
+use shared_types::{MonotonicNs, StereoCamera};
 use std::path::Path;
 use std::time::Instant;
 
 /// Pictures in a contact sheet, and how many stand in a row.
 const SHEET: (usize, usize) = (12, 3);
-/// Exposures in a picture of a throw.
-const STROBES: usize = 14;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -130,8 +130,7 @@ pub(super) fn score(
     // The picture is worth having even when the score fails.
     let found = crate::score::score(recording, camera, *tip_rgb, *target_rgb);
     let drawn = picture.as_ref().map_or(Ok(()), |path| {
-        let closest_s = found.as_ref().ok().map(|s| s.time_s);
-        write_strobe(recording, closest_s, Path::new(path))
+        write_throw(recording, found.as_ref().ok(), camera, Path::new(path))
     });
     // The first error is reported; a picture is the lesser loss.
     let found = found?;
@@ -159,32 +158,32 @@ pub(super) fn look(
     }
     let seen = crate::score::look(recording, camera, *tip_rgb, domino.as_ref(), *from_ns);
     let drawn = picture.as_ref().map_or(Ok(()), |path| {
-        write_strobe(recording, None, Path::new(path))
+        write_throw(recording, None, camera, Path::new(path))
     });
     let seen = seen?;
     drawn?;
     Ok(CameraEvent::Seen(seen))
 }
 
-/// A multiple exposure of the throw up to a little after the closest approach,
-/// on the scene behind what moves.
-fn write_strobe(
+/// Writes the picture of the throw.
+fn write_throw(
     recording: &mut Recording,
-    closest_s: Option<f64>,
+    found: Option<&Score>,
+    camera: &StereoCamera,
     path: &Path,
 ) -> Result<(), Failure> {
-    let start = MonotonicNs(recording.first_stamp_ns());
-    let until_s = closest_s.map_or(1.4, |t| t + 0.02);
-    let mut frames = Vec::new();
-    for i in 0..recording.len() {
-        frames.push(recording.read(i)?.left());
-    }
-    // What comes after the strike shows what the arm covered before it.
-    let scene = still_scene(&frames)?;
-    let until = |f: &&ImageFrame| MonotonicNs(f.stamp_ns).since_s(start) <= until_s;
-    let moving: Vec<&ImageFrame> = frames.iter().take_while(until).collect();
-    let step = moving.len().div_ceil(STROBES).max(1);
-    let chosen: Vec<&ImageFrame> = moving.into_iter().rev().step_by(step).collect();
-    strobe(&scene, &chosen)?.write_png(path)?;
+    let frames: Vec<ImageFrame> = (0..recording.len())
+        .map(|i| recording.read(i).map(|frame| frame.left()))
+        .collect::<Result<_, _>>()?;
+    let px = |m: &[f64; 3]| camera.project_left(&Vector3::from(*m));
+    let strike = found.and_then(|score| {
+        let tip = |(t, m): &(f64, [f64; 3])| Some((*t, px(m)?));
+        Some(Strike {
+            time_s: score.time_s,
+            target_px: px(&score.target_m)?,
+            tip_px: score.tip_path.iter().filter_map(tip).collect(),
+        })
+    });
+    throw_picture(&frames, strike.as_ref())?.write_png(path)?;
     Ok(())
 }

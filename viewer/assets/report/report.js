@@ -6,9 +6,9 @@ const hide = (id) => { byId(id).hidden = true; };
 
 function head() {
   const s = data.summary || {};
-  document.title = "wag report: " + data.run;
-  byId("title").textContent = data.run;
-  const head = [s.command, s.task, s.seed !== undefined && "seed " + s.seed,
+  document.title = `${data.headline} – ${data.run}`;
+  byId("title").textContent = data.headline;
+  const head = ["run " + data.run, s.command, s.task, s.seed !== undefined && "seed " + s.seed,
     s.ok === true ? "succeeded" : s.ok === false ? "failed" : null, s.error].filter(Boolean);
   byId("subtitle").textContent = head.map(String).join(" · ");
   byId("footer").textContent = `Made by wag ${data.version} from the run folder alone.`;
@@ -16,31 +16,35 @@ function head() {
 }
 
 function errors() {
-  const e = data.error, range = (i) => (i ? `${cm(i[0])} to ${cm(i[1])}` : "");
-  const rows = [["predicted by the plan", e.planned_m, range(e.forecast_90_m)],
-    ["achieved (the simulator's truth)", e.true_m, ""],
-    ["measured by the camera", e.camera_m, range(e.camera_interval_m)]].filter((r) => r[1] !== null);
+  const e = data.error, range = (i, of) => (i ? `${inWords(i[0])} to ${inWords(i[1])} (${of})` : "");
+  const throws = data.scenes.find((s) => s.tip) || {}, of = (curve) => (curve ? curve.closest : {});
+  const [planned, replayed] = [of(throws.planned), of(throws.tip)];
+  const rows = [["planned", e.planned_m, planned, range(e.forecast_90_m, "90 % of the forecast")],
+    ["replayed: the identified rope, simulated under the joints of the run", replayed.distance_m, replayed, ""],
+    ["measured by the camera", e.camera_m, {}, range(e.camera_interval_m, "2 standard errors")],
+    ["true (simulated rig)", e.true_m, {}, ""]].filter((r) => typeof r[1] === "number");
   if (!rows.length) return hide("outcome");
-  fill(byId("errors"), [["closest approach of tip and target", "distance", "interval"],
-    ...rows.map(([name, m, i]) => [name, cm(m), i])]);
+  const number = (v) => (typeof v === "number" ? v.toFixed(2) : "–");
+  fill(byId("errors"), [["closest approach of tip and target", "distance", "interval", "at (s)", "tip speed (m/s)"],
+    ...rows.map(([name, m, at, i]) => [name, inWords(m), i || "–", number(at.time_s), number(at.speed_m_s)])]);
 }
 
+/** How much of a limit was used: of a joint's range, the way to its nearer end. */
+const used = (r) => (r.to_end_deg === null ? (100 * r.used).toFixed(1) + " % used"
+  : r.to_end_deg.toFixed(1) + "° to the nearer end");
+
 function limits() {
-  const found = data.explanation ? data.explanation.margins : [];
-  if (!found.length && !data.plan_margins.length) return hide("limits");
+  const [found, planned] = [data.limits, data.planned_limits];
+  if (!found.length && !planned.length) return hide("limits");
+  const table = (id, name, rows) => rows.length && fill(byId(id), [[name, "motion", "joint", "extreme", "limit", "unit", "margin"],
+    ...rows.map((r) => [r.what, r.motion || "–", r.joint || "–", short(r.value), short(r.limit), r.unit, used(r)])]);
   if (data.explanation) {
     byId("limitnote").textContent = `${data.explanation.cycles} cycles in ${data.explanation.duration_s.toFixed(1)} s; ` +
       (data.explanation.stopped ? "the arm was stopped." : "the arm was not stopped.") +
       data.explanation.flaws.map((f) => " The recording is incomplete: " + f + ".").join("");
-    fill(byId("margins"), [["as commanded", "used", "value", "allowed", "unit", "joint"],
-      ...found.map((m) => [m.what, (100 * m.part).toFixed(1) + " %", short(m.value), short(m.limit), m.unit, m.joint || "–"])]);
+    table("margins", "as commanded", found);
   }
-  const tight = [...data.plan_margins].sort((a, b) => a.left - b.left).slice(0, 6);
-  if (tight.length) {
-    fill(byId("planmargins"), [["as planned (the six tightest)", "left", "value", "allowed", "at s"],
-      ...tight.map((m) => [(m.joint ? "joint " + m.joint : "tool") + " " + m.kind.replaceAll("_", " "),
-        (100 * m.left).toFixed(1) + " %", short(m.value), short(m.limit), m.time_s.toFixed(2)])]);
-  }
+  table("planmargins", "as planned (the tightest)", planned);
 }
 
 function rope() {
@@ -70,63 +74,4 @@ function rest() {
   byId("summary").textContent = JSON.stringify(s, null, 2);
 }
 
-/** Joints of a scene: wanted and measured, and the largest difference. */
-function joints(scene) {
-  const j = scene.joints, measured = j.measured[0].length > 0;
-  byId("jointnote").textContent = `Dashed: ${j.wanted_is}. ` + (measured
-    ? "Solid: measured. The difference is mostly the arm's lag." : "Nothing was measured.");
-  byId("joints").replaceChildren(...j.wanted.map((wanted, i) => {
-    const apart = Math.max(0, ...j.measured[i].map((v, k) => Math.abs(v - wanted[k])));
-    return make("figure", {}, curves(j.t_s, [
-      { values: j.measured[i], colour: "var(--measured)" },
-      { values: wanted, colour: "var(--wanted)", dashed: true }]),
-      make("figcaption", {}, `joint ${i + 1} (rad)` + (measured ? `, at most ${apart.toFixed(4)} apart` : "")));
-  }));
-}
-
-/** The replay: which scene, which frame, and whether it runs. */
-function replay() {
-  if (!data.scenes.length) { hide("replay"); return hide("motion"); }
-  const view = new View(byId("view")), slider = byId("time"), play = byId("play");
-  let scene = null, running = null;
-  const show = (frame) => {
-    slider.value = frame;
-    byId("clock").textContent = (scene.from_s + frame * scene.period_s).toFixed(2) + " s";
-    view.show(scene, frame);
-  };
-  const stop = () => { running = null; play.textContent = "Play"; };
-  const step = () => {
-    if (!running) return;
-    const frame = Math.floor(running.frame + (performance.now() - running.since) / 1000 / scene.period_s);
-    show(Math.min(frame, scene.arm.length - 1));
-    if (frame >= scene.arm.length - 1) stop(); else requestAnimationFrame(step);
-  };
-  play.addEventListener("click", () => {
-    if (running) return stop();
-    const at = Number(slider.value);
-    running = { frame: at >= scene.arm.length - 1 ? 0 : at, since: performance.now() };
-    play.textContent = "Pause";
-    requestAnimationFrame(step);
-  });
-  slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
-  const choose = (index) => {
-    stop();
-    scene = data.scenes[index];
-    slider.max = scene.arm.length - 1;
-    [...byId("scenes").children].forEach((b, i) => b.setAttribute("aria-pressed", String(i === index)));
-    byId("viewnote").textContent = "Drag to rotate, scroll or pinch to zoom. " +
-      (scene.rope.length ? "The rope is the identified one, simulated from rest under the joints of the run. Green: tip path. " : "") +
-      (scene.planned_tip.length ? "Orange: planned tip path." : "") +
-      (view.gl ? "" : " This browser has no WebGL, so nothing is drawn.");
-    joints(scene);
-    show(0);
-  };
-  byId("scenes").replaceChildren(...data.scenes.map((s, i) => {
-    const button = make("button", { type: "button" }, s.name);
-    button.addEventListener("click", () => choose(i));
-    return button;
-  }));
-  choose(data.scenes.length - 1);
-}
-
-for (const part of [head, errors, limits, rope, loop, film, rest, replay]) part();
+for (const part of [head, errors, replay, limits, rope, loop, film, rest]) part();

@@ -1,4 +1,3 @@
-"use strict";
 // Arm, pole, rope and target in WebGL: cylinders, balls and lines, nothing more.
 
 const VERTEX = `
@@ -50,46 +49,11 @@ function ball(rings, sides) {
   return out;
 }
 
-const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const unit = (a) => { const l = Math.hypot(...a) || 1; return a.map((v) => v / l); };
-
-/** Column-major product of two 4x4 matrices. */
-function times(a, b) {
-  const out = new Float32Array(16);
-  for (let c = 0; c < 4; c++) {
-    for (let r = 0; r < 4; r++) {
-      for (let k = 0; k < 4; k++) out[4 * c + r] += a[4 * k + r] * b[4 * c + k];
-    }
-  }
-  return out;
-}
-
-/** World to clip space for an eye that looks at a point, z up. */
-function cameraMatrix(eye, at, aspect) {
-  const f = unit(minus(at, eye)), s = unit(cross(f, [0, 0, 1])), u = cross(s, f);
-  const look = [s[0], u[0], -f[0], 0, s[1], u[1], -f[1], 0, s[2], u[2], -f[2], 0,
-    -dot(s, eye), -dot(u, eye), dot(f, eye), 1];
-  const near = 0.05, far = 30, g = 1 / Math.tan(0.35);
-  // A narrow window still shows the whole width.
-  const gx = aspect < 1 ? g : g / aspect, gy = aspect < 1 ? g * aspect : g;
-  const project = [gx, 0, 0, 0, 0, gy, 0, 0, 0, 0, (far + near) / (near - far), -1,
-    0, 0, (2 * far * near) / (near - far), 0];
-  return times(project, look);
-}
-
-/** Places of a flat row of tenths of a millimetre, in metres. */
-function points(flat) {
-  const out = [];
-  for (let i = 0; i + 2 < flat.length; i += 3) out.push([flat[i] / 1e4, flat[i + 1] / 1e4, flat[i + 2] / 1e4]);
-  return out;
-}
-
 class View {
   constructor(canvas, antialias = true) {
     this.canvas = canvas;
-    this.turn = -1.15; this.tilt = 0.22; this.far = 3.1; this.at = [0.45, 0, 0.12];
+    this.turn = -1.15; this.tilt = 0.22; this.far = 2.4; this.at = [0.45, 0, 0.12];
+    this.home = null;
     const gl = canvas.getContext("webgl", { antialias, preserveDrawingBuffer: true });
     this.gl = gl;
     if (!gl) return;
@@ -111,7 +75,7 @@ class View {
     // A rope's corners are small and many.
     this.thin = this.mesh(cylinder(8)); this.bead = this.mesh(ball(4, 8));
     this.line = this.mesh([]);
-    this.listen();
+    handle(this);
   }
 
   mesh(numbers) {
@@ -123,36 +87,41 @@ class View {
 
   /** Comes nearer or goes farther away. */
   near(factor) {
-    this.far = Math.min(8, Math.max(0.6, this.far * factor));
+    this.far = Math.min(8, Math.max(0.15, this.far * factor));
     this.draw();
   }
 
-  /** One pointer turns, two come nearer; so does the wheel. */
-  listen() {
-    const c = this.canvas, held = new Map();
-    c.addEventListener("pointerdown", (e) => { held.set(e.pointerId, [e.clientX, e.clientY]); c.setPointerCapture(e.pointerId); });
-    c.addEventListener("pointermove", (e) => {
-      const before = held.get(e.pointerId), now = [e.clientX, e.clientY];
-      if (!before) return;
-      held.set(e.pointerId, now);
-      if (held.size === 1) {
-        this.turn -= (now[0] - before[0]) * 0.008;
-        this.tilt = Math.min(1.5, Math.max(-0.4, this.tilt + (now[1] - before[1]) * 0.006));
-        this.draw();
-      } else if (held.size === 2) {
-        const other = [...held].find(([id]) => id !== e.pointerId)[1];
-        const apart = (p) => Math.max(10, Math.hypot(p[0] - other[0], p[1] - other[1]));
-        this.near(apart(before) / apart(now));
-      }
-    });
-    for (const end of ["pointerup", "pointercancel"]) c.addEventListener(end, (e) => held.delete(e.pointerId));
-    // One finger scrolls the page, two are the view's.
-    for (const kind of ["touchstart", "touchmove"]) {
-      c.addEventListener(kind, (e) => { if (e.touches.length > 1) e.preventDefault(); }, { passive: false });
-    }
-    c.addEventListener("wheel", (e) => { e.preventDefault(); this.near(Math.exp(e.deltaY * 0.001)); }, { passive: false });
-    addEventListener("resize", () => this.draw());
+  /** Shifts what is looked at by pixels of the canvas. */
+  pan(right, down) {
+    const [, s, u] = axes(this.turn, this.tilt), c = this.canvas;
+    const m = (2 * this.far * opening(c.clientWidth / c.clientHeight)[1]) / c.clientHeight;
+    this.at = this.at.map((v, k) => v + m * (u[k] * down - s[k] * right));
+    this.draw();
   }
+
+  /** Turns around what is looked at. */
+  orbit(turn, tilt) {
+    this.turn += turn;
+    this.tilt = Math.min(1.5, Math.max(-0.4, this.tilt + tilt));
+    this.draw();
+  }
+
+  /** Looks from the side with all these places in view; a reset comes back to it. */
+  frame(places) {
+    this.home = places;
+    [this.turn, this.tilt] = [-1.15, 0.22];
+    this.look(places);
+  }
+
+  /** Has all these places in view, from where the eye is turned to. */
+  look(places) {
+    if (!places.length) return;
+    const { at, far } = fitted(places, this.turn, this.tilt, this.canvas.clientWidth / this.canvas.clientHeight || 1);
+    [this.at, this.far] = [at, Math.min(8, Math.max(0.15, far))];
+    this.draw();
+  }
+
+  reset() { this.frame(this.home || []); }
 
   paint(mesh, model, colour, kind, lit) {
     const gl = this.gl;
@@ -187,8 +156,8 @@ class View {
     this.paint(this.line, new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]), colour, kind, false);
   }
 
-  /** Shows a frame of a scene. */
-  show(scene, frame) { this.scene = scene; this.frame = frame; this.draw(); }
+  /** Shows a scene at a frame, or between two. */
+  show(scene, frame) { this.scene = scene; this.now = frame; this.draw(); }
 
   draw() {
     const gl = this.gl, scene = this.scene;
@@ -199,8 +168,7 @@ class View {
     gl.viewport(0, 0, w, h);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const eye = [this.at[0] + this.far * Math.cos(this.tilt) * Math.cos(this.turn),
-      this.at[1] + this.far * Math.cos(this.tilt) * Math.sin(this.turn), this.at[2] + this.far * Math.sin(this.tilt)];
+    const forward = axes(this.turn, this.tilt)[0], eye = this.at.map((v, k) => v - this.far * forward[k]);
     gl.uniformMatrix4fv(this.place.camera, false, cameraMatrix(eye, this.at, w / h));
     const { floor_z_m: floor, column_half_width_m: half, pole: { radius_m: poleRadius } } = scene.cell;
     const grid = [];
@@ -209,22 +177,28 @@ class View {
     }
     this.way(grid, [0.55, 0.58, 0.62], gl.LINES);
     this.rod([0, 0, floor], [0, 0, 0], half, [0.5, 0.52, 0.55]);
-    const arm = points(scene.arm[this.frame] || []), last = arm.length - 1;
+    const arm = points(blend(scene.arm, this.now)), last = arm.length - 1;
     for (let i = 0; i < last; i++) {
       const pole = i === last - 1;
       this.rod(arm[i], arm[i + 1], pole ? poleRadius : 0.055 - 0.003 * i, pole ? [0.2, 0.2, 0.22] : [0.86, 0.88, 0.9]);
       if (!pole) this.sphere(arm[i + 1], 0.058 - 0.003 * i, [0.35, 0.37, 0.4]);
     }
-    const rope = points(scene.rope[this.frame] || []);
+    const rope = points(blend(scene.rope, this.now));
     for (let i = 0; i + 1 < rope.length; i++) {
       this.rod(rope[i], rope[i + 1], scene.radii_m[0], [0.72, 0.38, 0.2], this.thin);
       if (i + 2 < rope.length) this.sphere(rope[i + 1], scene.radii_m[0], [0.72, 0.38, 0.2], this.bead);
     }
     if (rope.length) this.sphere(rope[rope.length - 1], scene.radii_m[1], [0.25, 0.7, 0.2]);
-    const tips = (scene.tips || scene.rope.slice(0, this.frame + 1)).map((f) => points(f.slice(-3))[0]).filter(Boolean);
+    const tips = (scene.tips || scene.rope.slice(0, Math.floor(this.now) + 1)).map((f) => points(f.slice(-3))[0]).filter(Boolean);
+    if (!scene.tips && rope.length) tips.push(rope[rope.length - 1]);
     if (tips.length > 1) this.way(tips, [0.2, 0.62, 0.16], gl.LINE_STRIP);
-    const planned = points(scene.planned_tip);
-    if (planned.length > 1) this.way(planned, [0.85, 0.55, 0.05], gl.LINE_STRIP);
-    if (scene.target_m) this.sphere(scene.target_m, 0.02, [0.86, 0.1, 0.3]);
+    // Dashed, so that it stays in sight where the two cover each other.
+    this.way(dashes(points(scene.planned_tip), 0.012), [0.85, 0.55, 0.05], gl.LINES);
+    if (scene.target_m) {
+      this.sphere(scene.target_m, 0.02, [0.86, 0.1, 0.3]);
+      // Its cross is seen even where the rope's lead covers it.
+      const arm = (k, by) => scene.target_m.map((v, i) => (i === k ? v + by : v));
+      this.way([0, 1, 2].flatMap((k) => [arm(k, -0.06), arm(k, 0.06)]), [0.86, 0.1, 0.3], gl.LINES);
+    }
   }
 }

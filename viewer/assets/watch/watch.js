@@ -5,10 +5,15 @@ const byId = (id) => document.getElementById(id);
 const view = new View(byId("view"), false);
 const TIPS_MAX = 150;
 const WORDS = { stop: "Stop", disarm: "Disarm" };
+const STAGES = ["start", "bring-up", "wiggle", "track", "identify", "plan", "settle", "throw", "score"];
 const words = (name) => String(name).replaceAll("_", " ");
 /** What a test may read. */
 const watched = { states: 0, drawn: 0, pictures: 0, last: null };
-let tips = [], shownAsks = "", shownController = "";
+let tips = [], shownAsks = "", shownController = "", shownStage = "";
+/** Longer without a new picture, the one in view is no longer live (ms). */
+const OLD_MS = 1500;
+let caption = "", pictured = null, framed = false;
+byId("eyebuttons").replaceChildren(...eyeButtons(view));
 
 function controller(c) {
   // Rows that stay the same are not laid out again.
@@ -60,12 +65,45 @@ function jitter(histograms, missed) {
       `${h.p99_us.toFixed(0)} µs, max ${h.max_us.toFixed(0)} µs`))));
 }
 
+/** The stages of a run, those before the present one as done. */
+function stages(stage) {
+  byId("stages").hidden = !stage;
+  if (!stage || stage === shownStage) return;
+  shownStage = stage;
+  const at = STAGES.indexOf(stage);
+  byId("stages").replaceChildren(...STAGES.map((name, i) =>
+    make("li", i === at ? { "aria-current": "step" } : i < at ? { class: "done" } : {}, name)));
+}
+
+/** What is below the picture: its caption, or how old it is. */
+function pictureNote(age_ms) {
+  const old = age_ms > OLD_MS;
+  return [old, old ? `not live: this picture came ${(age_ms / 1000).toFixed(0)} s ago` : caption];
+}
+
+function showAge() {
+  if (pictured === null) return;
+  const note = byId("picturenote"), [old, text] = pictureNote(performance.now() - pictured);
+  if (note.textContent !== text) note.textContent = text;
+  note.classList.toggle("old", old);
+}
+setInterval(showAge, 500);
+
+/** The arm and all that belongs to it in view, once. */
+function frameOnce(s) {
+  if (framed || !s.arm.length) return;
+  framed = true;
+  view.frame([...points(s.arm), ...points(s.rope), ...(s.target_m ? [s.target_m] : [])]);
+}
+
 function draw(s) {
   byId("title").textContent = s.title;
   byId("note").textContent = s.note;
   view.show({ cell: s.cell, arm: [s.arm], rope: [s.rope], tips, planned_tip: [], radii_m: s.radii_m, target_m: s.target_m }, 0);
-  byId("viewnote").textContent = `Drag to rotate, scroll or pinch to zoom. Rope: ${s.rope_is || "none"}.` +
+  byId("viewnote").textContent = `${HANDLING} Rope: ${s.rope_is || "none"}.` +
     (view.gl ? "" : " This browser has no WebGL, so nothing is drawn.");
+  frameOnce(s);
+  stages(s.stage);
   controller(s.controller);
   asks(s.asks);
   byId("eye").hidden = !s.camera && !watched.pictures;
@@ -116,7 +154,9 @@ async function pictures() {
       c.drawImage(image, 0, 0);
       image.close();
       over(c, o);
-      byId("picturenote").textContent = o.caption;
+      caption = o.caption;
+      pictured = performance.now();
+      showAge();
       watched.pictures++;
     } catch { await wait(1000); }
   }

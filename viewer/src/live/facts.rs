@@ -1,6 +1,7 @@
 //! What the folder of a running run tells: its rope once it is identified, the target,
 //! where the camera stands.
 
+use super::stage::Results;
 use anyhow::Context;
 use arm_model::Cell;
 use camera_ingest::load_camera;
@@ -72,6 +73,15 @@ impl Facts {
         }
     }
 
+    /// What lies in the folder; none without one.
+    pub(crate) fn results(&self) -> Option<Results> {
+        Some(Results {
+            keypoints: self.folder.as_ref()?.join(files::KEYPOINTS).is_file(),
+            rope: self.identified.is_some(),
+            plan: self.plan.is_some(),
+        })
+    }
+
     /// The rope, and what it is called.
     pub(crate) fn rope(&self) -> Option<(RopeParams, &'static str)> {
         let planned = || Some((self.plan.as_ref()?.rope, "the plan's rope, simulated"));
@@ -116,6 +126,9 @@ mod tests {
         facts.look();
         assert_eq!(facts.rope().unwrap().0, rope);
         assert!(facts.target_m().is_none());
+        let results = facts.results().unwrap();
+        assert_eq!((results.rope, results.plan), (true, false));
+        assert_eq!(Facts::default().results(), None);
     }
 
     #[test]

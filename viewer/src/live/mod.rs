@@ -16,6 +16,7 @@ mod picture;
 mod received;
 mod rope;
 mod snapshot;
+mod stage;
 mod token;
 
 pub use facts::domain_of_run;
@@ -31,6 +32,7 @@ use run_log::CellHere;
 use shared_types::OperatingMode;
 use shared_types::ipc::ControllerMode;
 use snapshot::{ControllerView, Snapshot, StopView, note_stop};
+use stage::Progress;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, mpsc};
@@ -63,6 +65,7 @@ struct Shown {
     histograms_at: Option<Instant>,
     rope: Option<(FollowingRope, &'static str)>,
     stop: Option<StopView>,
+    progress: Progress,
     /// What it left in view.
     left: Snapshot,
 }
@@ -311,15 +314,18 @@ impl Watcher {
         let state = &seen.state;
         note_stop(&mut self.shown.stop, state.fault, state.cycle);
         let mode = ControllerMode::from_raw(state.mode);
+        let armed = OperatingMode::from_raw(state.operating_mode);
         snapshot.controller = Some(ControllerView {
             mode,
-            operating_mode: OperatingMode::from_raw(state.operating_mode),
+            operating_mode: armed,
             real_time: state.real_time != 0,
             cycle: state.cycle,
             alive: seen.alive,
             operator: seen.operator,
             stop: self.shown.stop.clone(),
         });
+        let results = facts.and_then(|facts| facts.results());
+        snapshot.stage = results.map(|found| self.shown.progress.stage(mode, armed, found));
         if mode != ControllerMode::Offline && state.q.is_finite() {
             snapshot.arm = arm_points(&state.q, &snapshot.cell.pole);
         }

@@ -1,6 +1,7 @@
 //! What a page is told, twenty-five times a second.
 
 use super::ask::Ask;
+use super::stage::Stage;
 use crate::report::Histogram;
 use arm_model::Cell;
 use serde::Serialize;
@@ -30,6 +31,8 @@ pub(crate) struct Snapshot {
     pub missed: u64,
     /// Whether a camera's frames come.
     pub camera: bool,
+    /// The stage that a run is in; none where there is no run folder.
+    pub stage: Option<Stage>,
     /// Each request, and why it may not be asked for now.
     pub asks: Vec<(Ask, Option<&'static str>)>,
 }

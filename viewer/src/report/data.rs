@@ -1,8 +1,9 @@
 //! What a report holds, as the page's script reads it.
 
+use super::approach::TipCurve;
+use super::limits::LimitRow;
 use arm_model::Cell;
 use arm_model::JOINTS;
-use arm_model::limits::Margin;
 use run_log::Explanation;
 use serde::Serialize;
 use serde_json::Value;
@@ -14,16 +15,20 @@ pub(crate) struct ReportData {
     pub version: &'static str,
     /// Name of the run folder.
     pub run: String,
+    /// What came of it, in one line.
+    pub headline: String,
     /// `summary.json`, without the long tables.
     pub summary: Value,
     /// Tip and target.
     pub error: Errors,
     pub rope: Vec<RopeRow>,
-    /// Margins of the plan, as planned.
-    pub plan_margins: Vec<Margin>,
-    /// Limits used and stops, from the recording of control cycles.
+    /// The tightest limits of the plan.
+    pub planned_limits: Vec<LimitRow>,
+    /// Limits used by what was commanded.
+    pub limits: Vec<LimitRow>,
+    /// What the recording of control cycles tells.
     pub explanation: Option<Explanation>,
-    /// The same stops as text, if there were any.
+    /// Its stops as text, if there were any.
     pub cause: Option<String>,
     pub latency: Vec<Histogram>,
     pub scenes: Vec<Scene>,
@@ -100,6 +105,10 @@ pub(crate) struct Scene {
     pub rope: Vec<Vec<i32>>,
     /// Planned path of the tip, at the same times (0.1 mm).
     pub planned_tip: Vec<i32>,
+    /// The tip of a throw's rope, simulated under the joints of the run.
+    pub tip: Option<TipCurve>,
+    /// The same as planned.
+    pub planned: Option<TipCurve>,
     /// Radius of the rope and of its lead (m).
     pub radii_m: [f64; 2],
     pub target_m: Option<[f64; 3]>,
@@ -115,6 +124,8 @@ pub(crate) struct Joints {
     pub t_s: Vec<f64>,
     /// Planned or commanded (rad), by joint.
     pub wanted: [Vec<f64>; JOINTS],
+    /// Setpoint minus measured (rad), by joint.
+    pub error: [Vec<f64>; JOINTS],
     /// Measured (rad), by joint.
     pub measured: [Vec<f64>; JOINTS],
 }

@@ -5,8 +5,12 @@
 //! wrong is an error that names the file. Everything from the run travels as one
 //! block of JSON, which the page's script puts in as text, never as markup.
 
+mod approach;
 mod data;
+mod headline;
 mod latency;
+mod limits;
+mod names;
 mod page;
 mod pictures;
 mod read;

@@ -9,10 +9,17 @@ const PAGE: &str = include_str!("../../assets/report/page.html");
 /// Colours and layout, shared with the live page.
 pub const STYLE: &str = include_str!("../../assets/report/style.css");
 /// Arm, rope and target in space, shared with the live page.
-pub const VIEW: &str = include_str!("../../assets/report/view.js");
+pub const VIEW: &str = concat!(
+    include_str!("../../assets/report/space.js"),
+    include_str!("../../assets/report/handle.js"),
+    include_str!("../../assets/report/view.js")
+);
 /// Curves, histograms, tables, shared with the live page.
 pub const PLOTS: &str = include_str!("../../assets/report/plots.js");
-const SCRIPT: &str = include_str!("../../assets/report/report.js");
+const SCRIPT: &str = concat!(
+    include_str!("../../assets/report/replay.js"),
+    include_str!("../../assets/report/report.js")
+);
 
 /// The whole page. The parts of the program go in first and the run's data last, so
 /// that nothing in a run can stand for one of them.

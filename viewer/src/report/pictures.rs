@@ -18,12 +18,12 @@ const BYTES_MAX: usize = 1_500_000;
 const PICTURES: [(&str, &str); 2] = [
     (
         "wiggle.png",
-        "Wiggle: the rope as it was followed, drawn over frames of the film",
+        "Wiggle: keypoints of the rope as it was followed, over frames of the film",
     ),
     (
         "throw.png",
-        "Throw: arm and rope at several moments in one picture, the last just after the tip came \
-         closest to the target",
+        "Throw: several exposures in one picture, with times since the first frame; the last is \
+         at the closest approach. Ring: target; magnified: the frame of the closest approach",
     ),
 ];
 

@@ -1,14 +1,18 @@
 //! A run folder as what a report holds.
 
 use super::data::{Errors, ReportData, RopeRow, Scene};
+use super::headline::headline;
+use super::limits::{self, Span};
+use super::names::names;
 use super::replay::{Known, motions, scene};
 use super::{latency, pictures};
 use anyhow::{Context, ensure};
 use run_log::{CellHere, NoRecording, RopeMotion, Run, explain, files, show};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use shared_types::RopeParams;
+use shared_types::ipc::CycleRecord;
 use shared_types::rope::RANGES;
+use shared_types::{MonotonicNs, RopeParams};
 use std::path::Path;
 
 /// Parts of `summary.json` that are told elsewhere, and better.
@@ -17,10 +21,36 @@ const TOLD_ELSEWHERE: [&str; 4] = ["identified", "truth", "explanation", "run"];
 const SCENES_MAX: usize = 6;
 
 /// The first motions of a run.
-fn scenes(known: &Known<'_>) -> anyhow::Result<Vec<Scene>> {
-    let motions = motions(&known.cycles.cycles).into_iter().take(SCENES_MAX);
-    let scene = |(index, motion)| scene(index, motion, known);
-    motions.enumerate().map(scene).collect()
+fn scenes(known: &Known<'_>, summary: &Value) -> anyhow::Result<Vec<Scene>> {
+    let motions = motions(&known.cycles.cycles);
+    let named = motion_names(&motions, known, summary);
+    let scene = |(name, motion)| scene(name, motion, known);
+    named
+        .into_iter()
+        .zip(motions)
+        .take(SCENES_MAX)
+        .map(scene)
+        .collect()
+}
+
+fn motion_names(motions: &[&[CycleRecord]], known: &Known<'_>, summary: &Value) -> Vec<String> {
+    let duration_s = |motion: &&[CycleRecord]| motion.last().map_or(0.0, |c| c.trajectory_s);
+    let durations_s: Vec<f64> = motions.iter().map(duration_s).collect();
+    let planned_s = known.plan.map(|plan| plan.trajectory.duration_s());
+    names(&durations_s, planned_s, summary, known.rope.is_some())
+}
+
+/// The motions' names and when each was (s from the first cycle).
+fn spans(known: &Known<'_>, summary: &Value) -> Vec<Span> {
+    let motions = motions(&known.cycles.cycles);
+    let named = motion_names(&motions, known, summary);
+    let first = known.cycles.cycles.first().map_or(0, |c| c.deadline_ns);
+    let at_s = |c: &CycleRecord| MonotonicNs(c.deadline_ns).since_s(MonotonicNs(first));
+    let ends = |motion: &[CycleRecord]| [at_s(&motion[0]), at_s(&motion[motion.len() - 1])];
+    named
+        .into_iter()
+        .zip(motions.into_iter().map(ends))
+        .collect()
 }
 
 /// The identified rope, simulated on the motions of a run folder.
@@ -33,6 +63,7 @@ pub fn simulated_rope(run: &Path) -> anyhow::Result<Vec<RopeMotion>> {
     let Some(rope) = run.rope()?.or(plan.as_ref().map(|p| p.rope)) else {
         return Ok(Vec::new());
     };
+    let summary = run.summary()?.unwrap_or_default();
     let known = Known {
         cell: run.cell()?.unwrap_or_default(),
         cycles: &run.recording()?.cycles()?,
@@ -46,7 +77,7 @@ pub fn simulated_rope(run: &Path) -> anyhow::Result<Vec<RopeMotion>> {
         nodes: scene.rope,
         radii_m: scene.radii_m,
     };
-    Ok(scenes(&known)?.into_iter().map(motion).collect())
+    Ok(scenes(&known, &summary)?.into_iter().map(motion).collect())
 }
 
 pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData> {
@@ -97,7 +128,7 @@ pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData
         plan: plan.as_ref(),
         target_m: value(&summary["target_m"]).or(plan.as_ref().map(|p| p.target_m)),
     };
-    let scenes = scenes(&known).with_context(|| format!("run `{}`", run.display()))?;
+    let scenes = scenes(&known, &summary).with_context(|| format!("run `{}`", run.display()))?;
     let moving: Vec<_> = motions(&cycles.cycles).into_iter().flatten().collect();
     let pictures = pictures::read(run, &mut missing)?;
     let error = Errors {
@@ -107,6 +138,10 @@ pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData
         camera_m: summary["score"]["closest_m"].as_f64(),
         camera_interval_m: value(&summary["score"]["interval_m"]),
     };
+    let tip_radius_m = known.rope.map_or(0.0, |rope| rope.lead_radius_m);
+    let headline = headline(&error, &summary, tip_radius_m);
+    let spans = spans(&known, &summary);
+    let used = explanation.as_ref().map(|e| limits::commanded(e, &spans));
     if let Some(table) = summary.as_object_mut() {
         for key in TOLD_ELSEWHERE {
             table.remove(key);
@@ -115,10 +150,15 @@ pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData
     Ok(ReportData {
         version: shared_types::VERSION,
         run: folder_name(run),
+        headline,
         summary,
         error,
         rope,
-        plan_margins: plan.as_ref().map(|p| p.margins.clone()).unwrap_or_default(),
+        planned_limits: plan
+            .as_ref()
+            .map(|p| limits::planned(&p.margins))
+            .unwrap_or_default(),
+        limits: used.unwrap_or_default(),
         cause: explanation.as_ref().filter(|e| e.stopped).map(show),
         explanation,
         latency: latency::histograms(&moving),

@@ -1,18 +1,21 @@
 //! Motions to look at: the arm as measured, the identified rope simulated on it.
 
+use super::approach::tip_curve;
 use super::data::{Joints, Scene};
 use anyhow::Context;
 use arm_model::{Cell, JOINTS, JointVector, Pole, kinematics};
 use nalgebra::Vector3;
 use rope_sim::{
-    AttachMotion, Candidate, FrameTimes, MeasuredArm, Outcome, PlannedArm, Precision, SimOptions,
-    roll_out,
+    AttachMotion, Candidate, FrameTimes, MeasuredArm, NodeTrack, Outcome, PlannedArm, Precision,
+    SimOptions, roll_out,
 };
 use run_log::Cycles;
 use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::{MonotonicNs, Plan, RopeParams};
 
 const RATE_HZ: f64 = 60.0;
+/// Samples of a throw's tip for each frame: at 10 m/s it moves by 2 cm from one to the next.
+const TIP_SAMPLES: usize = 8;
 /// Shown before a motion (s).
 const BEFORE_S: f64 = 0.2;
 /// Shown after a motion (s).
@@ -55,25 +58,16 @@ pub(crate) struct Known<'a> {
     pub target_m: Option<[f64; 3]>,
 }
 
-/// Which motions of `count` are the wiggle and the throw cannot be read from the
-/// cycles; the plan tells the throw by its duration, and what is first is the wiggle.
-fn name(index: usize, motion: &[CycleRecord], plan: Option<&Plan>, has_rope: bool) -> String {
-    let duration_s = motion.last().map_or(0.0, |c| c.trajectory_s);
-    let is_throw = plan.is_some_and(|p| (p.trajectory.duration_s() - duration_s).abs() < 0.02);
-    match (is_throw, index, has_rope) {
-        (true, _, _) => "throw".to_owned(),
-        (false, 0, true) => "wiggle".to_owned(),
-        _ => format!("motion {}", index + 1),
-    }
-}
-
 pub(crate) fn scene(
-    index: usize,
+    name: String,
     motion: &[CycleRecord],
     known: &Known<'_>,
 ) -> anyhow::Result<Scene> {
-    let name = name(index, motion, known.plan, known.rope.is_some());
-    let plan = known.plan.filter(|_| name == "throw");
+    let is_throw = name == "throw";
+    let plan = known.plan.filter(|_| is_throw);
+    // A throw's tip is looked at closely; of other motions the frames are enough.
+    let target = known.target_m.filter(|_| is_throw).map(Vector3::from);
+    let rate = target.map_or(1, |_| TIP_SAMPLES);
     let begin = begin(motion);
     let last = motion.last().unwrap_or(&motion[0]);
     let until_s = MonotonicNs(last.deadline_ns).since_s(begin).min(LONGEST_S) + AFTER_S;
@@ -84,14 +78,26 @@ pub(crate) fn scene(
     let shifted: Vec<f64> = times_s.iter().map(|t| t + BEFORE_S).collect();
     let on_film =
         MeasuredArm::new(&shifted, &q, known.cell.pole).context("the joints of a motion")?;
-    let step_s = if plan.is_some() { STEP_S.0 } else { STEP_S.1 };
+    let step_s = if is_throw { STEP_S.0 } else { STEP_S.1 };
     let rope = match known.rope {
-        Some(rope) => simulate(rope, &on_film, frames, step_s)?,
-        None => Vec::new(),
+        Some(rope) => simulate(rope, &on_film, finer(frames, rate), step_s)?,
+        None => None,
     };
-    let planned_tip = match plan {
-        Some(plan) => planned_tip(plan, known.cell.pole, until_s)?,
-        None => Vec::new(),
+    let planned = match plan {
+        Some(plan) => {
+            let arm = PlannedArm::new(plan.trajectory, known.cell.pole);
+            simulate(
+                &plan.rope,
+                &arm,
+                finer(self::frames(until_s), rate),
+                STEP_S.0,
+            )?
+        }
+        None => None,
+    };
+    let curve = |rope: &Option<NodeTrack>, from_s: f64| {
+        let span = [from_s, frames.period_s / rate as f64];
+        tip_curve(&tips(rope.as_ref()?), span, target.as_ref()?)
     };
     Ok(Scene {
         begin,
@@ -101,8 +107,14 @@ pub(crate) fn scene(
         arm: (0..frames.count)
             .map(|i| arm_points(&on_film.joints_at(frames.time_s(i)).q, &known.cell.pole))
             .collect(),
-        rope,
-        planned_tip,
+        tip: curve(&rope, -BEFORE_S),
+        planned: curve(&planned, 0.0),
+        planned_tip: planned
+            .iter()
+            .flat_map(|rope| tips(rope).into_iter().step_by(rate))
+            .flat_map(|tip| tenths_mm(&tip))
+            .collect(),
+        rope: rope.map_or_else(Vec::new, |rope| rows(&rope, rate)),
         radii_m: known
             .rope
             .map_or([0.0; 2], |r| [r.radius_m, r.lead_radius_m]),
@@ -157,40 +169,49 @@ pub fn arm_points(q: &JointVector, pole: &Pole) -> Vec<i32> {
         .collect()
 }
 
-/// Nodes of the rope in every frame, from hanging still in the first.
+/// The same span with more frames.
+fn finer(frames: FrameTimes, rate: usize) -> FrameTimes {
+    FrameTimes {
+        period_s: frames.period_s / rate as f64,
+        count: (frames.count.saturating_sub(1)) * rate + 1,
+        ..frames
+    }
+}
+
+/// The rope in every frame, from hanging still in the first; none when it cannot be simulated.
 fn simulate(
     rope: &RopeParams,
     motion: &dyn AttachMotion,
     frames: FrameTimes,
     step_s: f64,
-) -> anyhow::Result<Vec<Vec<i32>>> {
+) -> anyhow::Result<Option<NodeTrack>> {
     let end_s = frames.time_s(frames.count.saturating_sub(1));
     let options = SimOptions {
         frames,
         ..SimOptions::new(step_s, Precision::F64, end_s)
     };
     let rollouts = roll_out(&[Candidate::new(rope, motion)], &options)?;
-    let Some(rollout) = rollouts.first().filter(|r| r.outcome != Outcome::Diverged) else {
-        return Ok(Vec::new());
-    };
-    let nodes = &rollout.nodes;
-    Ok((0..nodes.frames())
-        .map(|frame| {
-            (0..nodes.nodes())
-                .flat_map(|node| tenths_mm(&nodes.position(frame, node)))
-                .collect()
-        })
-        .collect())
+    let whole = rollouts
+        .into_iter()
+        .find(|r| r.outcome != Outcome::Diverged);
+    Ok(whole.map(|r| r.nodes))
 }
 
-/// The tip's path with the plan's own rope on the planned motion.
-fn planned_tip(plan: &Plan, pole: Pole, until_s: f64) -> anyhow::Result<Vec<i32>> {
-    let arm = PlannedArm::new(plan.trajectory, pole);
-    let rope = simulate(&plan.rope, &arm, frames(until_s), STEP_S.0)?;
-    Ok(rope
-        .iter()
-        .flat_map(|nodes| nodes[nodes.len().saturating_sub(3)..].to_vec())
-        .collect())
+/// The tip in every frame (m).
+fn tips(rope: &NodeTrack) -> Vec<Vector3<f64>> {
+    let tip = rope.nodes().saturating_sub(1);
+    (0..rope.frames())
+        .map(|frame| rope.position(frame, tip))
+        .collect()
+}
+
+/// Nodes of every `rate`th frame, as the page reads them.
+fn rows(rope: &NodeTrack, rate: usize) -> Vec<Vec<i32>> {
+    let node = |frame, node| tenths_mm(&rope.position(frame, node));
+    (0..rope.frames())
+        .step_by(rate)
+        .map(|frame| (0..rope.nodes()).flat_map(|i| node(frame, i)).collect())
+        .collect()
 }
 
 /// Joints as wanted and as measured, at times that show their shape.
@@ -222,6 +243,7 @@ fn curves(
         for j in 0..JOINTS {
             joints.wanted[j].push(round(wanted[j]));
             joints.measured[j].extend(seen.map(|q| round(q[j])));
+            joints.error[j].extend(seen.map(|q| round(cycle.q_c[j] - q[j])));
         }
     }
     joints

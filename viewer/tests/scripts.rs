@@ -1,0 +1,15 @@
+//! What the pages' scripts calculate, in Node. Where there is none, this says so and passes;
+//! what the pages draw is looked at in a browser by the tests of `wag`.
+
+use std::process::Command;
+
+#[test]
+fn the_scripts_of_the_pages_calculate_as_they_should() {
+    let test = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scripts.js");
+    let Ok(made) = Command::new("node").arg(test).output() else {
+        eprintln!("no node on this machine: the pages' scripts were not run");
+        return;
+    };
+    let said = String::from_utf8_lossy(&made.stderr);
+    assert!(made.status.success(), "{said}");
+}
