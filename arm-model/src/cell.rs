@@ -4,20 +4,17 @@
 //! the same [`Cell`], read from a file under `configs/cell/`. Lengths in metres, world
 //! frame.
 
+use crate::checked_length::{below_zero, length, place};
 use crate::geometry::box_distance_m;
 use crate::joint::{JointState, JointVector};
 use crate::kinematics::{FrameMotion, flange_motion, flange_pose};
 use crate::task_bodies::{Board, StandingDomino, Wall};
-use crate::unit::unit_hint;
-use core::ops::RangeInclusive;
 use nalgebra::{Matrix3, Vector3};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 /// Part of the rope, measured from the clamp, that lies against the pole's end by
 /// construction (m): it touches nothing.
 pub const CLAMPED_M: f64 = 0.05;
-/// Largest length of anything in a cell (m).
-pub(crate) const LENGTH_MAX_M: f64 = 10.0;
 
 /// The pole on the flange, along the flange's +z. The rope's first joint sits at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -72,42 +69,6 @@ mod lab {
 
     pub(super) fn wall() -> Wall {
         Cell::default().wall
-    }
-}
-
-fn checked<'de, D: Deserializer<'de>>(
-    from: D,
-    range: RangeInclusive<f64>,
-    expected: &str,
-) -> Result<f64, D::Error> {
-    let value = f64::deserialize(from)?;
-    if range.contains(&value) {
-        return Ok(value);
-    }
-    let hint = unit_hint("_m", value, LENGTH_MAX_M);
-    Err(serde::de::Error::custom(format_args!(
-        "{value} m is {expected}{hint}"
-    )))
-}
-
-pub(crate) fn length<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    let range = f64::MIN_POSITIVE..=LENGTH_MAX_M;
-    checked(from, range, "not above 0 and at most 10 m")
-}
-
-fn below_zero<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    let range = -LENGTH_MAX_M..=-f64::MIN_POSITIVE;
-    checked(from, range, "not below 0 and at least -10 m")
-}
-
-fn place<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 3], D::Error> {
-    let place = <[f64; 3]>::deserialize(from)?;
-    match place.iter().find(|v| v.is_nan() || v.abs() > LENGTH_MAX_M) {
-        None => Ok(place),
-        Some(far) => Err(serde::de::Error::custom(format_args!(
-            "a coordinate is {far} m, beyond 10 m{}",
-            unit_hint("_m", *far, LENGTH_MAX_M)
-        ))),
     }
 }
 

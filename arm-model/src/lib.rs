@@ -24,6 +24,7 @@ extern crate alloc;
 
 pub mod capsules;
 pub mod cell;
+mod checked_length;
 pub mod exact;
 pub mod geometry;
 pub mod joint;

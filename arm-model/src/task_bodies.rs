@@ -3,7 +3,7 @@
 //! Each stands where the target says, turned to the bearing of the target from the base
 //! axis. Edges are outwards (away from the base axis), across and down.
 
-use crate::cell::{LENGTH_MAX_M, length};
+use crate::checked_length::{LENGTH_MAX_M, length};
 use crate::unit::unit_hint;
 use serde::{Deserialize, Deserializer, Serialize};
 

@@ -46,6 +46,7 @@ mod scene;
 mod scheme;
 pub mod sensitivity;
 mod state;
+mod surroundings;
 mod watch;
 
 pub use batch::{roll_out, roll_out_in, roll_out_in_with};

@@ -2,18 +2,16 @@
 
 use crate::algebra::Vec3;
 use crate::clock::BaseState;
-use crate::contact::{
-    Contacts, LOOK_PERIOD, Node, Predicted, StepEnd, check_start, corrected, predicted,
-};
+use crate::contact::{Contacts, StepEnd, check_start};
 use crate::equilibrium::hanging_links;
 use crate::error::{SimulateError, refuse_unless_positive};
-use crate::extra_loads::ExtraLanes;
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes, run_scalar};
-use crate::load::{LinkLoads, Unloaded};
+use crate::load::Unloaded;
 use crate::scene::{DominoOutcome, Scene};
 use crate::scheme::{Phase, Scheme, joint_resistance};
 use crate::state::{Link, RopeLanes};
+use crate::surroundings::Surroundings;
 use arm_model::kinematics::FrameMotion;
 use nalgebra::Vector3;
 use shared_types::RopeParams;
@@ -35,37 +33,6 @@ pub struct LiveRope {
     nodes: Vec<Vector3<f64>>,
     /// What the rope has beyond its nine parameters, and what it can touch.
     surroundings: Option<Surroundings>,
-}
-
-/// Extras and obstacles, with the loads of the current step.
-#[derive(Clone)]
-struct Surroundings {
-    extras: ExtraLanes<f64>,
-    contacts: Option<Contacts<f64>>,
-    loads: LinkLoads<f64>,
-    nodes: Vec<Node<f64>>,
-    /// Steps until the next look at how far everything is.
-    unseen: usize,
-}
-
-impl Surroundings {
-    fn of(rope: &RopeParams, links: &[Link<f64>], attach: &FrameMotion) -> Self {
-        let mut loads = LinkLoads::new(links.len());
-        let mut extras = ExtraLanes::new(&[rope], &mut loads);
-        extras.start(links, &BaseState::of(attach).dynamics);
-        Self {
-            extras,
-            contacts: None,
-            loads,
-            nodes: vec![Node::zero(); links.len()],
-            unseen: 0,
-        }
-    }
-
-    /// Whether the rope is about to touch something.
-    fn is_imminent(&self) -> bool {
-        self.contacts.as_ref().is_some_and(|c| c.imminent > 0.0)
-    }
 }
 
 impl core::fmt::Debug for LiveRope {
@@ -132,38 +99,33 @@ impl LiveRope {
         let attitudes: Vec<_> = self.links.iter().map(attitude).collect();
         check_start(scene, &self.params, &attach.p_m, &attitudes)
             .map_err(|why| SimulateError::of(0, why))?;
-        let surroundings = self
-            .surroundings
-            .get_or_insert_with(|| Surroundings::of(&self.params, &self.links, attach));
-        let ropes = [&self.params];
-        surroundings.contacts =
-            (!scene.is_empty()).then(|| Contacts::new(scene, &ropes, self.max_step_s, [0.0; 3]));
-        surroundings.unseen = 0;
+        self.surroundings
+            .get_or_insert_with(|| Surroundings::of(&self.params, &self.links, attach))
+            .put(scene, &self.params, self.max_step_s);
         Ok(())
     }
 
     /// What became of the scene's domino; `None` without one.
     #[must_use]
     pub fn domino(&self) -> Option<DominoOutcome> {
-        self.surroundings.as_ref()?.contacts.as_ref()?.domino_of(0)
+        self.contacts()?.domino_of(0)
     }
 
     /// Its tilt now (rad), as [`DominoOutcome::peak_tilt_rad`] is counted.
     #[must_use]
     pub fn domino_tilt_rad(&self) -> Option<f64> {
-        self.surroundings
-            .as_ref()?
-            .contacts
-            .as_ref()?
-            .tilt_rad_of(0)
+        self.contacts()?.tilt_rad_of(0)
     }
 
     /// Whether the rope has touched an obstacle of the scene, by its index.
     #[must_use]
     pub fn has_touched(&self, obstacle: usize) -> bool {
-        let contacts = self.surroundings.as_ref().and_then(|s| s.contacts.as_ref());
-        let touched = contacts.map(|c| c.summaries_of(0));
+        let touched = self.contacts().map(|c| c.summaries_of(0));
         touched.is_some_and(|t| t.get(obstacle).is_some_and(|o| o.touched()))
+    }
+
+    fn contacts(&self) -> Option<&Contacts<f64>> {
+        self.surroundings.as_ref()?.contacts.as_ref()
     }
 
     /// Advances to `to_t_s` in equal steps, reading the attach frame's motion at the
@@ -215,53 +177,11 @@ impl LiveRope {
     fn step(&mut self, attach: &BaseState<f64>, end: StepEnd) {
         let (links, scratch, rope) = (&mut self.links, &mut self.scratch, &self.rope);
         let (base, scheme) = (&attach.dynamics, &self.scheme);
-        let Some(Surroundings {
-            extras,
-            contacts,
-            loads,
-            nodes,
-            unseen,
-        }) = &mut self.surroundings
-        else {
-            step(links, scratch, rope, base, scheme, &Unloaded);
-            return;
-        };
-        if let Some(contacts) = contacts {
-            if *unseen == 0 {
-                corrected(nodes, links, rope, attach);
-                contacts.look(nodes, rope);
-                *unseen = LOOK_PERIOD;
+        match &mut self.surroundings {
+            Some(around) => around.step(links, scratch, (rope, attach, scheme), end),
+            None => {
+                step(links, scratch, rope, base, scheme, &Unloaded);
             }
-            *unseen -= 1;
-        }
-        let mut engaged = contacts.as_mut().filter(|contacts| contacts.is_engaged());
-        if engaged.is_none() && !extras.is_any() {
-            step(links, scratch, rope, base, scheme, &Unloaded);
-            return;
-        }
-        for link in links.iter_mut() {
-            link.predict(scheme);
-        }
-        predicted(nodes, links, rope, attach, scheme);
-        loads.clear();
-        extras.load(loads, links, nodes, rope, base, scheme);
-        if let Some(contacts) = &mut engaged {
-            let attach = attach.position;
-            contacts.load(
-                loads,
-                Predicted {
-                    links,
-                    nodes,
-                    attach,
-                    scheme,
-                },
-            );
-        }
-        step(links, scratch, rope, base, scheme, loads);
-        extras.settle(links, base, scheme);
-        if let Some(contacts) = engaged {
-            corrected(nodes, links, rope, attach);
-            contacts.settle(links, nodes, scheme, &[end]);
         }
     }
 

@@ -44,6 +44,8 @@ pub mod rpc;
 #[cfg(feature = "std")]
 mod running;
 #[cfg(feature = "std")]
+mod sight;
+#[cfg(feature = "std")]
 mod slots;
 #[cfg(feature = "std")]
 mod sweep;
