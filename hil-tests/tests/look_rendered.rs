@@ -15,10 +15,10 @@ use shared_types::Task;
 use shared_types::ipc::message::{DominoLook, SeenThrow};
 
 const RATE_HZ: f64 = 60.0;
-const FRAMES: u32 = 200;
+const FRAMES: u32 = 126;
 /// The tip leaves where it hangs, and lies still again (s).
-const LEAVES_S: f64 = 0.5;
-const RESTS_S: f64 = 1.5;
+const LEAVES_S: f64 = 0.2;
+const RESTS_S: f64 = 0.9;
 const LEAD_RADIUS_M: f64 = 0.025;
 
 /// A tip that goes from where it hangs to `end_m` by a way above both.
@@ -29,7 +29,7 @@ fn tip(end_m: Vector3<f64>, t_s: f64) -> Vector3<f64> {
     start_m + (end_m - start_m) * u + Vector3::z() * arc_m
 }
 
-/// Films a throw whose tip ends at a place of the target's frame; the domino falls at 1.4 s, if
+/// Films a throw whose tip ends at a place of the target's frame; the domino falls at 0.8 s, if
 /// it does.
 fn film(task: Task, target_m: [f64; 3], end_m: [f64; 3], falls: bool, seed: u64) -> SeenThrow {
     let config: CameraConfig = RigConfig::default().seeing(task).camera;
@@ -47,7 +47,7 @@ fn film(task: Task, target_m: [f64; 3], end_m: [f64; 3], falls: bool, seed: u64)
     let mut frames: Vec<StereoFrame> = (0..FRAMES)
         .map(|index| {
             let t_s = f64::from(index) / RATE_HZ;
-            renderer.lean_domino(if falls && t_s > 1.4 { 1.0 } else { 0.0 });
+            renderer.lean_domino(if falls && t_s > 0.8 { 1.0 } else { 0.0 });
             let at = tip(end_m, t_s + config.exposure_s / 2.0);
             let clamp_m = Vector3::new(0.6, 0.0, 0.45);
             let nodes = (0..=10).map(|k| clamp_m + (at - clamp_m) * (f64::from(k) / 10.0));
@@ -88,7 +88,7 @@ fn worst_m(seen: &SeenThrow, end_m: Vector3<f64>) -> [f64; 2] {
 
 #[test]
 fn a_tip_on_the_board_and_a_domino_are_seen_at_every_bearing() {
-    for (seed, bearing_deg) in [(1_u64, -20.0_f64), (2, 0.0), (3, 20.0), (4, 8.0)] {
+    for (seed, bearing_deg) in [(1_u64, -20.0_f64), (2, 0.0), (3, 20.0)] {
         let (s, c) = bearing_deg.to_radians().sin_cos();
         let target_m = [0.85 * c, 0.85 * s, 0.10 + 0.05 * seed as f64];
         for falls in [false, true] {
