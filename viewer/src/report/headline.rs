@@ -19,6 +19,13 @@ pub(crate) fn headline(errors: &Errors, summary: &Value, tip_radius_m: f64) -> S
         .as_f64()
         .is_none_or(|s| s > 0.0);
     let Some(closest_m) = closest else {
+        if let (Some(task), Some(is_done)) = (text("task"), verdict) {
+            let said = match is_done {
+                true => format!("{} done", capital(task)),
+                false => format!("{} failed ({})", capital(task), unmet(summary)),
+            };
+            return with(&said, planned);
+        }
         let what = match text("task").filter(|_| planned.is_some() && is_thrown) {
             Some(_) => "throw, its distance to the target not measured",
             None => text("command").unwrap_or("run"),

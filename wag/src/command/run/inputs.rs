@@ -200,7 +200,9 @@ impl Inputs {
             target_m,
             colours: [
                 args.tip_rgb.map(|named| named.0).or(tip_rgb),
-                args.target_rgb.map(|named| named.0).or(target_rgb),
+                args.target_rgb
+                    .map(|named| named.0)
+                    .or(target_rgb.filter(|_| of_task)),
             ],
             accept_unconfirmed: args.accept_unconfirmed,
             robust: args.robust,

@@ -206,6 +206,12 @@ fn on_camera(
     entry: Entry,
 ) -> Outcome<Option<Value>> {
     check_first(&entry, &address, &limits, &settings)?;
+    if inputs.task != Task::Strike && !inputs.is_simulated() && !asks(arm, &address) {
+        return Err(bad_input!(
+            "before a {} somebody must put board or wall in its place, and say so: leave out --yes",
+            inputs.task.name()
+        ));
+    }
     let operator = operator(arm, &address)?;
     require_clear_area(arm, &address, "MOVE")?;
     watch_interrupts().or_failed()?;

@@ -118,11 +118,14 @@ impl<'a> Run<'a> {
             arm,
         };
         run.look(stage)?;
-        let is_thrown = run.record.target_m.is_some() && run.record.task != Task::Drape;
-        if is_thrown && run.record.target_rgb.is_none() {
-            run.warn(&format!(
-                "the throw will not be measured: {UNNAMED_COLOURS}"
-            ));
+        let unseen = match run.record.task {
+            Task::Strike => Some("the throw will not be measured"),
+            Task::Lob => Some("whether the domino falls will not be seen"),
+            Task::Drape => None,
+        };
+        let unseen = unseen.filter(|_| run.record.target_m.is_some());
+        if let Some(unseen) = unseen.filter(|_| run.record.target_rgb.is_none()) {
+            run.warn(&format!("{unseen}: {UNNAMED_COLOURS}"));
         }
         run.record.stages.start_s = stage.done("controller, camera and planner are up");
         Ok(run)
