@@ -32,10 +32,10 @@ pub enum OverlayError {
     Input(&'static str),
 }
 
-/// Widest picture in a contact sheet (px): a dozen stay around a megabyte.
-const SHEET_WIDTH_PX: usize = 340;
-/// The part of an image that is shown is at least so many times as large as where the
-/// keypoints are.
+/// Sides of a picture in a contact sheet (px): a dozen stay around a megabyte.
+const SIDE_MIN_PX: usize = 200;
+const SIDE_MAX_PX: usize = 340;
+/// The part of an image that is shown is so many times as large as where the keypoints are.
 const ROOM: f64 = 1.4;
 /// Radius of a keypoint's dot, and least distance between two dots (px).
 const DOT_PX: f64 = 2.6;
@@ -107,8 +107,8 @@ struct Part {
 }
 
 impl Part {
-    /// The part around points (px) that has the sides of the image `size` and, as often as it
-    /// has to be halved, thirded, ..., the width of a picture in a sheet.
+    /// The part around points (px) of an image of this `size`, with room around them, and as
+    /// often halved, thirded, ... as a sheet needs it; without points, all of the image.
     fn around<'a>(points: impl Iterator<Item = &'a [f64; 2]>, size: [usize; 2]) -> Self {
         let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         for p in points.filter(|p| p[0].is_finite() && p[1].is_finite()) {
@@ -116,26 +116,16 @@ impl Part {
                 *end = [end[0].min(*x), end[1].max(*x)];
             }
         }
-        let most = size[0].div_ceil(SHEET_WIDTH_PX).max(1);
-        let sides = |factor: usize| {
-            let width = (SHEET_WIDTH_PX * factor).min(size[0]);
-            [
-                width,
-                (width * size[1]).div_ceil(size[0].max(1)).min(size[1]),
-            ]
-        };
-        // What is around the rope belongs to the picture, too.
-        let holds = |factor: &usize| {
-            let side = sides(*factor);
-            (0..2).all(|k| ROOM * (ends[k][1] - ends[k][0]) <= side[k] as f64)
-        };
-        let factor = (1..most).find(holds).unwrap_or(most);
-        let sides = sides(factor);
+        if ends[0][0] > ends[0][1] {
+            ends = size.map(|side| [0.0, side as f64]);
+        }
+        let needed = ends.map(|[from, to]| (ROOM * (to - from)).ceil() as usize);
+        let shown = [0, 1].map(|k| needed[k].min(size[k]));
+        let factor = shown[0].max(shown[1]).div_ceil(SIDE_MAX_PX).max(1);
+        let sides = [0, 1].map(|k| shown[k].max(SIDE_MIN_PX * factor).min(size[k]));
         let begin = |k: usize| {
             let middle = f64::midpoint(ends[k][0], ends[k][1]);
-            let begin = (middle - sides[k] as f64 / 2.0).max(0.0);
-            // Without a point there is no middle, and the part begins at the edge.
-            let begin = if begin.is_finite() { begin as usize } else { 0 };
+            let begin = (middle - sides[k] as f64 / 2.0).max(0.0) as usize;
             begin.min(size[k] - sides[k])
         };
         Self {
@@ -213,18 +203,20 @@ mod tests {
         let size = [680, 340];
         let near = [[400.0, 200.0], [420.0, 260.0]];
         let part = Part::around(near.iter(), size);
-        assert_eq!((part.factor, part.size), (1, [340, 170]));
-        assert_eq!((part.left, part.top), (240, 145));
-        assert_eq!(part.place([400.0, 200.0]), [160.0, 55.0]);
+        assert_eq!((part.factor, part.size), (1, [200, 200]));
+        assert_eq!((part.left, part.top), (310, 130));
+        assert_eq!(part.place([400.0, 200.0]), [90.0, 70.0]);
         // At the edge the part ends with the image, and a long rope is made smaller.
         let edge = [[679.0, 339.0]];
         let part = Part::around(edge.iter(), size);
-        assert_eq!((part.left, part.top), (340, 170));
-        let long = [[10.0, 10.0], [600.0, 300.0]];
+        assert_eq!((part.left, part.top), (480, 140));
+        let long = [[10.0, 10.0], [400.0, 300.0]];
         let part = Part::around(long.iter(), size);
-        assert_eq!((part.factor, part.left, part.top), (2, 0, 0));
+        assert_eq!((part.factor, part.size), (2, [546, 340]));
+        assert_eq!((part.left, part.top), (0, 0));
         assert_eq!(part.place([0.5, 0.5]), [0.0, 0.0]);
-        assert_eq!(Part::around([].iter(), size).left, 0);
+        let none = Part::around([].iter(), size);
+        assert_eq!((none.left, none.size, none.factor), (0, size, 2));
     }
 
     #[test]

@@ -92,10 +92,13 @@ fn close_up_side(frame: &ImageFrame) -> usize {
     2 * (frame.width_px / CLOSE_UP.0) * CLOSE_UP.1
 }
 
-/// The target in the frame of the strike, magnified.
+/// The target in the frame of the strike, magnified, its middle marked.
 fn close_up(frame: &ImageFrame, strike: &Strike, time_s: f64) -> Picture {
     let (half_px, factor) = (frame.width_px / CLOSE_UP.0, CLOSE_UP.1);
     let mut large = Picture::of(frame).magnified(strike.target_px, half_px, factor);
+    // The tip may cover the target: its middle is marked.
+    let middle = (half_px * factor) as f64;
+    large.ring([middle, middle], 3.0, RING);
     let time = format!("{time_s:.2} s");
     let [_, height] = text_size(&time, 2);
     let below = large.height_px as i64 - height - 2;
@@ -149,10 +152,10 @@ mod tests {
         let picture = throw_picture(&frames, Some(&strike)).unwrap();
         let ringed = picture.rgb.chunks(3).filter(|p| *p == RING).count();
         let border = 4 * 2 * 80 - 16;
-        assert!(ringed > border + 30 && ringed < border + 80, "{ringed}");
+        assert!(ringed > border + 40 && ringed < border + 100, "{ringed}");
         // Upper right: 80 pixels of the 20 around the target, where the tip is then.
         let at = |u: usize, v: usize| picture.rgb[(v * 340 + u) * 3];
-        assert_eq!((at(300, 40), at(340 - 80 + 10, 10)), (240, 100));
+        assert_eq!((at(308, 40), at(340 - 80 + 10, 10)), (240, 100));
         // Nothing after the strike is exposed.
         assert_eq!(at(40 + 3 * 57, 124), 100);
         assert!(throw_picture(&frames, None).is_ok());

@@ -19,7 +19,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Pictures in a contact sheet, and how many stand in a row.
-const SHEET: (usize, usize) = (12, 3);
+const SHEET: (usize, usize) = (12, 4);
 
 type Failure = Box<dyn std::error::Error>;
 

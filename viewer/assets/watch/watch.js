@@ -89,11 +89,12 @@ function showAge() {
 }
 setInterval(showAge, 500);
 
-/** The arm and all that belongs to it in view, once. */
+/** The arm and all that belongs to it in view, once; later only by the reset button. */
 function frameOnce(s) {
-  if (framed || !s.arm.length) return;
+  if (!s.arm.length) return;
+  view.home = [...points(s.arm), ...points(s.rope), ...(s.target_m ? [s.target_m] : [])];
+  if (!framed) view.reset();
   framed = true;
-  view.frame([...points(s.arm), ...points(s.rope), ...(s.target_m ? [s.target_m] : [])]);
 }
 
 function draw(s) {

@@ -11,28 +11,31 @@ use planner::preflight::{Fence, JudgedArm, RuleMargin, arm_margins, first_stop, 
 use run_log::files::read_plan;
 use serde_json::{Value, json};
 
-fn kind_name(kind: LimitKind) -> &'static str {
-    match kind {
-        LimitKind::PositionMin => "position, lower",
-        LimitKind::PositionMax => "position, upper",
-        LimitKind::Velocity | LimitKind::TcpSpeed => "speed",
-        LimitKind::Acceleration => "acceleration",
+/// What a limit is about, and what is left of it: of a range, the way to its end.
+fn kind_and_left(m: &Margin) -> (&'static str, String) {
+    let to_end = |rad: f64| format!("{:.1} deg", rad.to_degrees());
+    let left = format!("{:.1} %", 100.0 * m.left);
+    match m.kind {
+        LimitKind::PositionMin => ("position, lower", to_end(m.value - m.limit)),
+        LimitKind::PositionMax => ("position, upper", to_end(m.limit - m.value)),
+        LimitKind::Velocity | LimitKind::TcpSpeed => ("speed", left),
+        LimitKind::Acceleration => ("acceleration", left),
     }
 }
 
 fn margin_table(margins: &[Margin]) -> Table {
     let rows = margins.iter().map(|m| {
-        let who = if m.joint == 0 {
-            "tool".to_owned()
-        } else {
-            format!("joint {}", m.joint)
+        let (kind, left) = kind_and_left(m);
+        let who = match m.joint {
+            0 => "tool".to_owned(),
+            joint => format!("joint {joint}"),
         };
         [
-            format!("{who} {}", kind_name(m.kind)),
+            format!("{who} {kind}"),
             format!("{:.3}", m.value),
             format!("{:.3}", m.limit),
             format!("{:.3}", m.time_s),
-            format!("{:.1} %", 100.0 * m.left),
+            left,
         ]
     });
     table::numbers(["limit", "extreme", "allowed", "at (s)", "left"], 0, rows)
@@ -40,10 +43,9 @@ fn margin_table(margins: &[Margin]) -> Table {
 
 fn rule_table(margins: &[RuleMargin]) -> Table {
     let rows = margins.iter().map(|m| {
+        let code = m.rule.code();
         [
-            m.rule
-                .code()
-                .map_or_else(|| "-".to_owned(), |c| format!("C{c}")),
+            code.map_or_else(|| "-".to_owned(), |c| format!("C{c}")),
             m.rule.name().to_owned(),
             format!("{:.4}", m.value),
             format!("{:.4}", m.limit),
@@ -58,11 +60,9 @@ fn rule_table(margins: &[RuleMargin]) -> Table {
 /// Prints which of the limits, which are all kept, is nearest; returns it.
 pub fn print_tightest(margins: &[Margin]) -> Option<&Margin> {
     let tightest = margins.iter().min_by(|a, b| a.left.total_cmp(&b.left));
-    println!(
-        "All {} limits are kept, and the arm would not stop. Tightest: {}.",
-        margins.len(),
-        tightest.map_or_else(String::new, Margin::describe)
-    );
+    let words = tightest.map_or_else(String::new, Margin::describe);
+    let count = margins.len();
+    println!("All {count} limits are kept, and the arm would not stop. Tightest: {words}.");
     tightest
 }
 

@@ -15,7 +15,7 @@ use shared_types::{KeypointTrack, MonotonicNs};
 use std::path::Path;
 
 /// Pictures in a contact sheet, and how many stand in a row.
-const SHEET: (usize, usize) = (12, 3);
+const SHEET: (usize, usize) = (12, 4);
 
 /// Tracks the rope through a film; a learned tracker reads it where there is one. The
 /// left-eye frames, and what was found in them.
