@@ -121,6 +121,11 @@ mod tests {
             headline(&found, &lob, 0.02),
             "Lob failed (not met: domino down): 2.7 cm (planned 2.0 cm)"
         );
+        let unmeasured = errors(Some(0.0196), None, None);
+        assert_eq!(
+            headline(&unmeasured, &lob, 0.02),
+            "Lob failed (not met: domino down) (planned 2.0 cm)"
+        );
         lob["true_verdict"]["success"] = json!(true);
         assert_eq!(
             headline(&found, &lob, 0.02),
