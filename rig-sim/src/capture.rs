@@ -54,7 +54,7 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
             place(&mut renderer, config, placed);
             drawn = placed;
         }
-        renderer.lean_domino(record.tilt_rad());
+        renderer.lean_domino(record.tilt_rad(opens));
         let header = FrameHeader {
             sequence: shutter.sequence,
             stamp_ns: opens.0,
@@ -67,7 +67,7 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
 }
 
 /// Draws from now on what stands at the target.
-fn place(renderer: &mut Renderer, config: &RigConfig, placed: Option<Placed>) {
+fn place(renderer: &mut Renderer, config: &RigConfig, placed: Placed) {
     let ball = placed.filter(|(task, _)| *task == Task::Strike);
     renderer.place_target(ball.map(|(_, target_m)| target_m));
     renderer.place_bodies(placed.map(|(task, target_m)| {

@@ -62,7 +62,7 @@ pub fn run_announced(
     let rope = config.rope();
     let record = Record::default();
     if let Some(target_m) = config.target_m {
-        record.want((Task::Strike, Vector3::from(target_m)));
+        record.want(Some((Task::Strike, Vector3::from(target_m))));
     }
     let arm = SimulatedArm::start(config.arm())?;
     let (history, ports) = (arm.history(), arm.ports());

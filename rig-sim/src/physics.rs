@@ -68,11 +68,16 @@ impl Physics {
     }
 
     /// Puts the bodies of a task around the rope.
-    fn place(&mut self, (task, target_m): Placed) -> Result<(), String> {
-        let scene = Scene::of_task(task, target_m.into(), &self.cell);
+    fn place(&mut self, placed: Placed) -> Result<(), String> {
+        let scene = placed.map_or(Scene::EMPTY, |(task, target_m)| {
+            Scene::of_task(task, target_m.into(), &self.cell)
+        });
         let attach = self.cell.pole.attach_motion(&self.last.state);
         let placed = self.live.set_scene(&scene, &attach);
-        placed.map_err(|why| format!("the {} cannot stand there: {why}", task.name()))
+        placed.map_err(|why| {
+            tracing::warn!(%why, "a body cannot stand where it is to be placed");
+            "the rope hangs where board, domino or wall would stand: move the target farther from the arm".to_owned()
+        })
     }
 
     /// Moves on to the next sample of the arm.

@@ -38,8 +38,8 @@ pub(super) struct Bodies {
     pub(super) touched: bool,
 }
 
-/// What a throw is for, and where.
-pub(super) type Placed = (Task, Vector3<f64>);
+/// What a throw is for, and where; nothing where there is none.
+pub(super) type Placed = Option<(Task, Vector3<f64>)>;
 
 #[derive(Debug, Clone, Copy)]
 struct Tip {
@@ -67,7 +67,7 @@ const SEEN_PERIOD_S: f64 = 0.01;
 struct Kept {
     ropes: VecDeque<Snapshot>,
     tips: VecDeque<Tip>,
-    placed: Option<Placed>,
+    placed: Placed,
     /// What is to be placed, until physics has taken it.
     wanted: Option<Placed>,
     /// Why physics has not.
@@ -129,7 +129,8 @@ impl Record {
 
     /// What physics is to place next.
     pub(super) fn want(&self, placed: Placed) {
-        self.kept().wanted = Some(placed);
+        let mut kept = self.kept();
+        (kept.wanted, kept.refused) = (Some(placed), None);
     }
 
     /// What is to be placed, if that is new.
@@ -140,9 +141,9 @@ impl Record {
     /// Notes what became of what was wanted.
     pub(super) fn placed_as(&self, placed: Placed, outcome: Result<(), String>) {
         let mut kept = self.kept();
-        kept.wanted = None;
+        kept.wanted = kept.wanted.filter(|newer| *newer != placed);
         match outcome {
-            Ok(()) => kept.placed = Some(placed),
+            Ok(()) => kept.placed = placed,
             Err(why) => kept.refused = Some(why),
         }
         drop(kept);
@@ -150,15 +151,16 @@ impl Record {
     }
 
     /// What stands at the target.
-    pub(super) fn placed(&self) -> Option<Placed> {
+    pub(super) fn placed(&self) -> Placed {
         self.kept().placed
     }
 
-    /// Tilt of the domino now (rad).
-    pub(super) fn tilt_rad(&self) -> f64 {
+    /// Tilt of the domino at an instant (rad).
+    pub(super) fn tilt_rad(&self, at: MonotonicNs) -> f64 {
         let kept = self.kept();
-        let bodies = kept.ropes.back().map(|newest| newest.bodies);
-        bodies.map_or(0.0, |bodies| bodies.tilt_rad)
+        let next = kept.ropes.partition_point(|m| m.at < at);
+        let then = kept.ropes.get(next).or(kept.ropes.back());
+        then.map_or(0.0, |then| then.bodies.tilt_rad)
     }
 
     /// Waits at most `patience` until physics has reached `at`; says whether.
@@ -312,7 +314,7 @@ mod tests {
         let record = passing();
         let ask = |from, to| record.truth(MonotonicNs(from * MS), MonotonicNs(to * MS));
         assert!(ask(500, 1200).unwrap_err().contains("no target"));
-        record.placed_as((Task::Strike, Vector3::x()), Ok(()));
+        record.placed_as(Some((Task::Strike, Vector3::x())), Ok(()));
         let truth = ask(500, 1200).unwrap();
         assert!((truth.closest_m - 0.03).abs() < 1e-12);
         assert!(truth.closest_at.0.abs_diff(1_000_300_000) < 1_000);

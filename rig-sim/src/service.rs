@@ -81,11 +81,15 @@ fn answer(request: &RigRequest, config: &RigConfig, ports: ArmPorts, record: &Re
                     message: format!("target {target_m:?} does not lie within 10 m of the robot"),
                 };
             }
-            match record.place((task, Vector3::from(target_m)), PATIENCE) {
+            match record.place(Some((task, Vector3::from(target_m))), PATIENCE) {
                 Ok(()) => RigEvent::Done,
                 Err(message) => RigEvent::Failed { message },
             }
         }
+        RigRequest::RemoveTarget => match record.place(None, PATIENCE) {
+            Ok(()) => RigEvent::Done,
+            Err(message) => RigEvent::Failed { message },
+        },
         RigRequest::Scene => {
             let colours = config.appearance();
             RigEvent::Scene {

@@ -106,6 +106,16 @@ impl Session {
     /// # Errors
     /// Something else was typed, or nothing, or nobody is there.
     pub fn confirm(&mut self, now: &str, word: &'static str) -> anyhow::Result<u64> {
+        self.confirm_within(now, word, CONFIRMED_WITHIN)
+    }
+
+    /// [`Self::confirm`] of what takes a person longer.
+    pub fn confirm_within(
+        &mut self,
+        now: &str,
+        word: &'static str,
+        within: Duration,
+    ) -> anyhow::Result<u64> {
         let Some(presence) = &mut self.presence else {
             bail!("nobody is watched who could confirm");
         };
@@ -115,7 +125,7 @@ impl Session {
              Area clear: type {word} "
         );
         let began = Instant::now();
-        while began.elapsed() < CONFIRMED_WITHIN {
+        while began.elapsed() < within {
             self.tick()?;
             let Some(presence) = &mut self.presence else {
                 break;

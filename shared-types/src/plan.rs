@@ -50,6 +50,10 @@ pub struct Verdict {
     pub success: bool,
     /// Its conditions, in the task's order.
     pub conditions: Vec<Condition>,
+    /// Conditions of a throw that was made of which nobody saw whether they were met; with any,
+    /// it did not surely succeed.
+    #[serde(default)]
+    pub unseen: Vec<String>,
 }
 
 impl core::fmt::Display for Verdict {
@@ -61,9 +65,14 @@ impl core::fmt::Display for Verdict {
                 .collect::<Vec<_>>()
                 .join(", ")
         };
-        match self.success {
-            true => write!(f, "succeeded ({})", named(true)),
-            false => write!(f, "failed (not met: {})", named(false)),
+        let has_failed = self.conditions.iter().any(|c| !c.met);
+        match (self.success, has_failed) {
+            (true, _) => write!(f, "succeeded ({})", named(true)),
+            (false, true) => write!(f, "failed (not met: {})", named(false)),
+            (false, false) => {
+                write!(f, "not known (met: {}; not seen: ", named(true))?;
+                write!(f, "{})", self.unseen.join(", "))
+            }
         }
     }
 }

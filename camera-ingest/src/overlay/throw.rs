@@ -7,9 +7,8 @@ use shared_types::MonotonicNs;
 
 /// Exposures in a picture of a throw.
 const EXPOSURES: usize = 14;
-/// The film is shown up to this long after the strike, and so far where none was seen (s).
+/// The film is shown up to this long after the strike (s).
 const AFTER_S: f64 = 0.02;
-const UNSEEN_S: f64 = 1.4;
 /// The close-up: pixels to each side of the target as a part of the image's width, and how
 /// much they are magnified.
 const CLOSE_UP: (usize, usize) = (34, 4);
@@ -31,19 +30,21 @@ pub(crate) struct Strike {
 }
 
 /// A multiple exposure of the throw up to a little after the closest approach, on the scene
-/// behind what moves, with times beside the tip and the strike magnified.
+/// behind what moves, with times beside the tip and the strike magnified. Without a strike, up to
+/// `unseen_s` after the first frame.
 ///
 /// # Errors
 /// No frames, or sizes differ.
 pub(crate) fn throw_picture(
     frames: &[ImageFrame],
     strike: Option<&Strike>,
+    unseen_s: f64,
 ) -> Result<Picture, OverlayError> {
     // What comes after the strike shows what the arm covered before it.
     let scene = still_scene(frames)?;
     let start = MonotonicNs(frames.first().map_or(0, |f| f.stamp_ns));
     let time_s = |f: &ImageFrame| MonotonicNs(f.stamp_ns).since_s(start);
-    let until_s = strike.map_or(UNSEEN_S, |s| s.time_s + AFTER_S);
+    let until_s = strike.map_or(unseen_s, |s| s.time_s + AFTER_S);
     let moving: Vec<&ImageFrame> = frames.iter().take_while(|f| time_s(f) <= until_s).collect();
     let step = moving.len().div_ceil(EXPOSURES).max(1);
     let mut exposed: Vec<&ImageFrame> = moving.into_iter().rev().step_by(step).collect();
@@ -149,7 +150,7 @@ mod tests {
             target_px: [164.0, 124.0],
             tip_px: (0..60).map(tip).collect(),
         };
-        let picture = throw_picture(&frames, Some(&strike)).unwrap();
+        let picture = throw_picture(&frames, Some(&strike), 1.0).unwrap();
         let ringed = picture.rgb.chunks(3).filter(|p| *p == RING).count();
         let border = 4 * 2 * 80 - 16;
         assert!(ringed > border + 40 && ringed < border + 100, "{ringed}");
@@ -158,7 +159,7 @@ mod tests {
         assert_eq!((at(308, 40), at(340 - 80 + 10, 10)), (240, 100));
         // Nothing after the strike is exposed.
         assert_eq!(at(40 + 3 * 57, 124), 100);
-        assert!(throw_picture(&frames, None).is_ok());
-        assert!(throw_picture(&[], None).is_err());
+        assert!(throw_picture(&frames, None, 1.0).is_ok());
+        assert!(throw_picture(&[], None, 1.0).is_err());
     }
 }

@@ -21,6 +21,11 @@ use std::time::Instant;
 /// Pictures in a contact sheet, and how many stand in a row.
 const SHEET: (usize, usize) = (12, 4);
 
+/// How far a film is shown of a strike that was not measured, and of a throw after which the rope
+/// comes to rest (s).
+const UNSEEN_S: f64 = 1.4;
+const RESTS_S: f64 = 3.0;
+
 type Failure = Box<dyn std::error::Error>;
 
 /// Tracks the rope and publishes its keypoints.
@@ -130,7 +135,12 @@ pub(super) fn score(
     // The picture is worth having even when the score fails.
     let found = crate::score::score(recording, camera, *tip_rgb, *target_rgb);
     let drawn = picture.as_ref().map_or(Ok(()), |path| {
-        write_throw(recording, found.as_ref().ok(), camera, Path::new(path))
+        write_throw(
+            recording,
+            (found.as_ref().ok(), UNSEEN_S),
+            camera,
+            Path::new(path),
+        )
     });
     // The first error is reported; a picture is the lesser loss.
     let found = found?;
@@ -158,7 +168,7 @@ pub(super) fn look(
     }
     let seen = crate::score::look(recording, camera, *tip_rgb, domino.as_ref(), *from_ns);
     let drawn = picture.as_ref().map_or(Ok(()), |path| {
-        write_throw(recording, None, camera, Path::new(path))
+        write_throw(recording, (None, RESTS_S), camera, Path::new(path))
     });
     let seen = seen?;
     drawn?;
@@ -168,7 +178,7 @@ pub(super) fn look(
 /// Writes the picture of the throw.
 fn write_throw(
     recording: &mut Recording,
-    found: Option<&Score>,
+    (found, unseen_s): (Option<&Score>, f64),
     camera: &StereoCamera,
     path: &Path,
 ) -> Result<(), Failure> {
@@ -184,6 +194,6 @@ fn write_throw(
             tip_px: score.tip_path.iter().filter_map(tip).collect(),
         })
     });
-    throw_picture(&frames, strike.as_ref())?.write_png(path)?;
+    throw_picture(&frames, strike.as_ref(), unseen_s)?.write_png(path)?;
     Ok(())
 }

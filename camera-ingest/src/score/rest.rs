@@ -2,7 +2,8 @@
 //!
 //! A tip that lies still for most of the film would be taken for the scene behind it: the scene
 //! is what the film's first frames show, in which the rope still hangs. The domino is known by
-//! its pixels there: as long as it stands, they keep its colour.
+//! its pixels there: as long as it stands, they keep its colour. It has fallen where they have
+//! lost it and others beside them have it instead: one that something covers is not fallen.
 
 use super::blob::{Chroma, chroma_of_rgb, coverage};
 use super::path::{LocalPath, mark_small};
@@ -18,15 +19,15 @@ use shared_types::{MonotonicNs, StereoCamera};
 const FIRST_FRAMES: usize = 9;
 const LAST_FRAMES: usize = 15;
 /// Around the domino's projection: what a calibration is off by, and more (px).
-const WINDOW_PX: f64 = 14.0;
+const WINDOW_PX: f64 = 22.0;
 /// Coverage from which a sample shows the domino.
 const COVERED: f64 = 0.4;
 /// Samples of it in both images that make it visible.
 const MIN_SAMPLES: usize = 6;
 /// Part of its samples that keep its colour as long as it stands.
 const STANDS: f64 = 0.5;
-/// Part of them that the tip may cover before nothing can be told.
-const COVERED_BY_TIP: f64 = 0.3;
+/// New samples of its colour, as a part of those it had, that show where it lies.
+const LIES: f64 = 0.25;
 
 /// Looks for tip and domino in all frames; `from_ns` is the begin of the throw
 /// (CLOCK_MONOTONIC).
@@ -48,7 +49,8 @@ pub fn look(
         )));
     }
     check_colour("tip", tip_rgb)?;
-    domino.map_or(Ok(()), |domino| check_colour("domino", domino.rgb))?;
+    // A grey one is not seen.
+    let domino = domino.filter(|domino| check_colour("domino", domino.rgb).is_ok());
     let first: Vec<usize> = (0..FIRST_FRAMES).collect();
     let scene = Scene::of_frames(source, camera, &first)?;
     let (mut detections, mut end_s) = (Vec::new(), 0.0);
@@ -76,7 +78,7 @@ pub fn look(
     let paths = (0..detections.len())
         .filter_map(|index| LocalPath::around(&detections, index, blob_error(camera)));
     let tip = paths.map(|path| (path.t_s, to_world(path.at(path.t_s)).into()));
-    let fell = domino.and_then(|domino| has_fallen(&scene, camera, domino, tip_rgb, &last));
+    let fell = domino.and_then(|domino| has_fallen(&scene, camera, domino, &last));
     Ok(SeenThrow {
         end_s,
         tip: tip.collect(),
@@ -85,18 +87,16 @@ pub fn look(
     })
 }
 
-/// Whether the domino's pixels have lost its colour; `None` where it was not seen at first, or
-/// where the tip lies before it.
+/// Whether the domino lies; `None` where it was not seen at first, or is covered.
 fn has_fallen(
     scene: &Scene<'_>,
     camera: &StereoCamera,
     domino: &DominoLook,
-    tip_rgb: [u8; 3],
     last: &[StereoFrame],
 ) -> Option<bool> {
-    let (wanted, tip) = (chroma_of_rgb(domino.rgb), chroma_of_rgb(tip_rgb));
+    let wanted = chroma_of_rgb(domino.rgb);
     let eyes: [fn(&StereoFrame) -> ImageFrame; 2] = [StereoFrame::left, StereoFrame::right];
-    let (mut seen, mut kept, mut hidden) = (0_usize, 0_usize, 0_usize);
+    let (mut seen, mut kept, mut beside) = (0_usize, 0_usize, 0_usize);
     for (k, (of, image)) in eyes.iter().zip(&scene.images).enumerate() {
         let frames: Vec<_> = last.iter().map(of).collect();
         let now = crate::track::median_frame(&frames);
@@ -106,16 +106,23 @@ fn has_fallen(
             coverage(sample, middle, colour) > COVERED
         };
         for at in window(camera, k, domino, image)? {
+            let is_there = covers(&now, at, wanted);
             if covers(image, at, wanted) {
                 seen += 1;
-                kept += usize::from(covers(&now, at, wanted));
-                hidden += usize::from(covers(&now, at, tip));
+                kept += usize::from(is_there);
+            } else {
+                beside += usize::from(is_there);
             }
         }
     }
     let part = |samples: usize| samples as f64 / seen as f64;
-    let is_known = seen >= MIN_SAMPLES && part(hidden) < COVERED_BY_TIP;
-    is_known.then(|| part(kept) < STANDS)
+    if seen < MIN_SAMPLES {
+        return None;
+    }
+    match part(kept) >= STANDS {
+        true => Some(false),
+        false => (part(beside) >= LIES).then_some(true),
+    }
 }
 
 /// Chroma samples around the domino in one image; `None` where it is out of view.

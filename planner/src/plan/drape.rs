@@ -126,7 +126,7 @@ impl Drape {
                 rest.is_some_and(|r| r.tip_m[2] < self.target_m[2]),
             ),
             (
-                "rope touched the wall",
+                super::seen::TOUCHED,
                 outcome.obstacles.first().is_some_and(|wall| wall.touched()),
             ),
         ]

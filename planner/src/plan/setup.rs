@@ -95,12 +95,17 @@ impl<'a> Setup<'a> {
             ..simulator_for(task, &request.rope, &request.cell, &request.options)
         };
         let clamp_m = request.cell.pole.attach_pose(&space.start).0;
-        let hanging = Capsule {
-            a_m: clamp_m,
-            b_m: clamp_m - Vector3::z() * request.rope.length_m,
-            radius_m: request.rope.lead_radius_m,
+        let tip_m = clamp_m - Vector3::z() * request.rope.length_m;
+        let hanging = |a_m, radius_m| Capsule {
+            a_m,
+            b_m: tip_m,
+            radius_m,
         };
-        let is_free = |block: &Block| block.gap_m(&hanging) > 0.0;
+        let hanging = [
+            hanging(clamp_m, request.rope.radius_m),
+            hanging(tip_m, request.rope.lead_radius_m),
+        ];
+        let is_free = |block: &Block| hanging.iter().all(|part| block.gap_m(part) > 0.0);
         if !simulator.keep_clear.iter().all(is_free) {
             return Err(PlanError::Target(format!(
                 "what the {} is thrown at would stand where the rope hangs before the throw: move the target farther from the arm",

@@ -68,6 +68,7 @@ pub fn verdict<const N: usize>(conditions: [(&str, bool); N]) -> Verdict {
     Verdict {
         success: conditions.iter().all(|(_, met)| *met),
         conditions: conditions.map(condition).into(),
+        unseen: Vec::new(),
     }
 }
 

@@ -297,7 +297,7 @@ fn warm_starts_are_executable_at_any_bearing() {
 
 #[test]
 fn bodies_where_the_rope_hangs_are_refused_in_words() {
-    for (kind, near_m, far_m) in [(Task::Lob, 0.78, 0.86), (Task::Drape, 0.66, 0.75)] {
+    for (kind, near_m, far_m) in [(Task::Lob, 0.80, 0.86), (Task::Drape, 0.66, 0.75)] {
         let of = |x_m: f64| {
             let goal = PlannerConfig::default().goal(kind, [x_m, 0.0, 0.2]);
             PlanRequest::new(goal, &random_rope(3), PlanOptions::default())

@@ -361,6 +361,8 @@ pub enum RigRequest {
         /// The target in the world (m).
         target_m: [f64; 3],
     },
+    /// Take away what a throw was for.
+    RemoveTarget,
     /// What really happened between two instants?
     Truth {
         /// From (CLOCK_MONOTONIC, ns).

@@ -19,6 +19,11 @@ pub(crate) fn headline(errors: &Errors, summary: &Value, tip_radius_m: f64) -> S
         .as_f64()
         .is_none_or(|s| s > 0.0);
     let Some(closest_m) = closest else {
+        let unseen = &summary["camera_verdict"]["unseen"][0];
+        if let (Some(task), Some(unseen)) = (text("task"), unseen.as_str()) {
+            let said = format!("{} not wholly seen ({unseen})", capital(task));
+            return with(&said, planned);
+        }
         if let (Some(task), Some(is_done)) = (text("task"), verdict) {
             let said = match is_done {
                 true => format!("{} done", capital(task)),

@@ -22,8 +22,8 @@ const PICTURES: [(&str, &str); 2] = [
     ),
     (
         "throw.png",
-        "Throw: several exposures in one picture, with times since the first frame; the last is \
-         at the closest approach. Ring: target; magnified: the frame of the closest approach",
+        "Throw: several exposures in one picture. Of a strike the last is at the closest approach, \
+         with times since the first frame, a ring around the target, and that frame magnified",
     ),
 ];
 

@@ -7,7 +7,7 @@ use arm_model::{Cell, JOINTS, JointVector, Pole, kinematics};
 use nalgebra::Vector3;
 use rope_sim::{
     AttachMotion, Candidate, FrameTimes, MeasuredArm, NodeTrack, Outcome, PlannedArm, Precision,
-    SimOptions, roll_out,
+    SimOptions, roll_out_in,
 };
 use run_log::Cycles;
 use shared_types::ipc::{ControllerMode, CycleRecord};
@@ -79,14 +79,18 @@ pub(crate) fn scene(
     let on_film =
         MeasuredArm::new(&shifted, &q, known.cell.pole).context("the joints of a motion")?;
     let step_s = if is_throw { STEP_S.0 } else { STEP_S.1 };
+    let around = plan.map_or(rope_sim::Scene::EMPTY, |plan| {
+        rope_sim::Scene::of_task(plan.task, plan.target_m, &known.cell)
+    });
     let rope = match known.rope {
-        Some(rope) => simulate(rope, &on_film, finer(frames, rate), step_s)?,
+        Some(rope) => simulate(&around, rope, &on_film, finer(frames, rate), step_s)?,
         None => None,
     };
     let planned = match plan {
         Some(plan) => {
             let arm = PlannedArm::new(plan.trajectory, known.cell.pole);
             simulate(
+                &around,
                 &plan.rope,
                 &arm,
                 finer(self::frames(until_s), rate),
@@ -180,6 +184,7 @@ fn finer(frames: FrameTimes, rate: usize) -> FrameTimes {
 
 /// The rope in every frame, from hanging still in the first; none when it cannot be simulated.
 fn simulate(
+    around: &rope_sim::Scene,
     rope: &RopeParams,
     motion: &dyn AttachMotion,
     frames: FrameTimes,
@@ -190,7 +195,7 @@ fn simulate(
         frames,
         ..SimOptions::new(step_s, Precision::F64, end_s)
     };
-    let rollouts = roll_out(&[Candidate::new(rope, motion)], &options)?;
+    let rollouts = roll_out_in(around, &[Candidate::new(rope, motion)], &options)?;
     let whole = rollouts
         .into_iter()
         .find(|r| r.outcome != Outcome::Diverged);

@@ -12,7 +12,7 @@ use planner::arm_response::Following;
 use planner::plan::{PlanRequest, Shortcoming, correction, plan_again, shortcoming, warnings};
 use run_log::{Run, files};
 use serde_json::{Value, json};
-use shared_types::Plan;
+use shared_types::{Plan, Task};
 use std::path::Path;
 
 /// Refuses to throw a plan whose track is unconfirmed, or that was made for another cell.
@@ -39,6 +39,12 @@ impl LastThrow {
         thrown.or_input()?;
         let in_run = run.as_ref().map(|run| run.folder().join(files::PLAN));
         let plan = files::read_plan(in_run.as_deref().unwrap_or(last)).or_input()?;
+        if plan.task != Task::Strike {
+            let task = plan.task.name();
+            return Err(bad_input!(
+                "a {task} is not corrected by its miss: plan another (`wag run {task} --from plan RUN`)"
+            ));
+        }
         let unnamed = || {
             anyhow!("where did the tip pass? Name it with --miss X,Y,Z, as `wag score` prints it")
         };

@@ -1,18 +1,20 @@
 //! The two motions of a run that are filmed, and what the film of the throw tells.
 
-use super::stages::{Run, UNNAMED_COLOURS, answered};
+use super::stages::{DECAYED_WITHIN_S, Run, UNNAMED_COLOURS, answered};
 use super::summary;
 use crate::command::motion;
 use crate::pipeline::{self, execute};
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::JointTrajectory;
-use cli_output::{Failure, Stage, output};
+use cli_output::{Failure, Stage};
 use planner::arm_response::Following;
 use planner::plan::{Shortcoming, ThrowGoal, judge_seen, shortcoming};
+use rt_controller::os::now_ns;
 use run_log::{Film, files};
 use session::Session;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, DominoLook, RigEvent, RigRequest};
-use shared_types::{MonotonicNs, OperatingMode, Plan, RopeParams, Task, Verdict};
+use shared_types::{MonotonicNs, OperatingMode, Plan, Task, Verdict};
+use std::time::Duration;
 
 /// Frames of a wiggle (paper: 400 at 60 Hz).
 const WIGGLE_FRAMES: u32 = 400;
@@ -22,6 +24,8 @@ const RATE_HZ: f64 = 60.0;
 const STRIKE_FRAMES: u32 = 150;
 /// Time after the last setpoint that still belongs to a strike (s).
 const AFTER_STRIKE_S: f64 = 0.6;
+/// Time for putting a board or a wall in its place.
+const PLACED_WITHIN: Duration = Duration::from_secs(900);
 /// From the first frame of a film to the motion's begin, at most (s).
 const BEFORE_THROW_S: f64 = 0.4;
 
@@ -139,7 +143,7 @@ impl Run<'_> {
         let what = match task {
             Task::Strike => return Ok(()),
             Task::Lob => format!(
-                "the board of {:?} m with the middle of its upper face, and the domino {} m before it,",
+                "the board of {:?} m with the middle of its upper face, and on it the domino {} m before that,",
                 cell.board.size_m, cell.domino.before_target_m
             ),
             Task::Drape => format!(
@@ -147,9 +151,16 @@ impl Run<'_> {
                 cell.wall.size_m
             ),
         };
-        output::remark(format_args!(
-            "put {what} at ({x:.3}, {y:.3}, {z:.3}) m, square to the line from the arm's base, without touching the rope"
-        ));
+        let told = format!(
+            "The arm is enabled and stands at the throw's start. Put {what} at ({x:.3}, {y:.3}, {z:.3}) m, square to the line from the arm's base, without touching the rope, and leave the area."
+        );
+        self.session
+            .confirm_within(&told, "PLACED", PLACED_WITHIN)?;
+        let stage = Stage::begin("place");
+        if !self.wait_still(&stage, DECAYED_WITHIN_S)? {
+            self.warn("the rope swings, and the throw is planned for one that hangs still");
+        }
+        stage.done("what the throw is for stands in its place");
         Ok(())
     }
 
@@ -188,13 +199,13 @@ impl Run<'_> {
 
     /// Measures by the camera what the throw was for. That it could not
     /// see the throw does not undo the throw; it is reported.
-    pub fn score(&mut self, throw: &Film, rope: &RopeParams) {
+    pub fn score(&mut self, throw: &Film, plan: &Plan) {
         let tracked = self.record.track.as_ref();
         let tracked = tracked.map(|track| track.appearance.lead_rgb);
         self.record.tip_rgb = self.record.tip_rgb.or(tracked);
         if self.record.task != Task::Strike {
             let stage = Stage::begin("score");
-            let judged = self.judge(throw, rope, &stage);
+            let judged = self.judge(throw, plan, &stage);
             self.record.stages.score_s = stage.done(&match &judged {
                 Ok(verdict) => format!("by camera: {verdict}"),
                 Err(_) => "the camera could not judge the throw".to_owned(),
@@ -228,7 +239,7 @@ impl Run<'_> {
     }
 
     /// Judges a lob or drape by what the camera sees of tip and domino.
-    fn judge(&mut self, throw: &Film, rope: &RopeParams, stage: &Stage) -> anyhow::Result<Verdict> {
+    fn judge(&mut self, throw: &Film, plan: &Plan, stage: &Stage) -> anyhow::Result<Verdict> {
         let goal = self.goal().context("a throw needs a target")?;
         let cell = self.setup.settings.cell;
         let domino = goal.task().scene(&cell).domino;
@@ -237,7 +248,7 @@ impl Run<'_> {
             tip_rgb: self
                 .record
                 .tip_rgb
-                .ok_or_else(|| anyhow!(UNNAMED_COLOURS))?,
+                .context("name the colour of the tip with --tip-rgb")?,
             domino: domino
                 .zip(self.record.target_rgb)
                 .map(|(domino, rgb)| DominoLook {
@@ -249,29 +260,53 @@ impl Run<'_> {
             strobe: Some(self.folder.file("throw.png").display().to_string()),
         };
         match self.ask_camera(&request, 60.0, stage)? {
-            CameraEvent::Seen(seen) => Ok(judge_seen(&goal, rope, &cell, &seen)
-                .map_err(anyhow::Error::msg)?
-                .verdict),
+            CameraEvent::Seen(mut seen) => {
+                let until_s = plan.trajectory.duration_s() + self.rests_s().unwrap_or_default();
+                ensure!(
+                    seen.end_s > until_s - 0.1,
+                    "the film ends {:.1} s after the throw's begin, the rope must rest until {until_s:.1} s: does the camera send {RATE_HZ} frames a second?",
+                    seen.end_s
+                );
+                seen.tip.retain(|(time_s, _)| *time_s <= until_s);
+                seen.end_s = seen.end_s.min(until_s);
+                let rope = (&plan.rope, self.clamp_m(plan));
+                let judged = judge_seen(&goal, rope, &cell, &seen).map_err(anyhow::Error::msg)?;
+                Ok(judged.verdict)
+            }
             other => bail!("the camera process answered with {other:?}"),
         }
     }
 
+    /// Where the rope is held after the throw (m).
+    fn clamp_m(&self, plan: &Plan) -> [f64; 3] {
+        let pole = self.setup.settings.cell.pole;
+        pole.attach_pose(&plan.trajectory.end()).0.into()
+    }
+
     /// Only now a rig is asked what really happened.
-    pub fn compare_with_truth(&mut self, throw: &Film) -> anyhow::Result<()> {
-        let Some(rig) = &self.setup.rig else {
+    pub fn compare_with_truth(&mut self, throw: &Film, plan: &Plan) -> anyhow::Result<()> {
+        if self.setup.rig.is_none() {
             return Ok(());
-        };
+        }
         let rests_s = self.rests_s();
         let after_s = rests_s.unwrap_or(AFTER_STRIKE_S);
+        let to = MonotonicNs(throw.motion.end_ns).plus_s(after_s);
         let request = RigRequest::Truth {
             from_ns: throw.motion.start_ns,
-            to_ns: MonotonicNs(throw.motion.end_ns).plus_s(after_s).0,
+            to_ns: to.0,
+        };
+        // Where the film was lost, what is asked for may not be over.
+        let left_s = to.since_s(MonotonicNs(now_ns())).max(0.0);
+        self.session.idle(Duration::from_secs_f64(left_s))?;
+        let Some(rig) = &self.setup.rig else {
+            return Ok(());
         };
         let truth = self.session.ask(rig, &request, 10.0, |_| ())?;
         if let (RigEvent::Truth { rope, seen, .. }, Some(goal), Some(_)) =
             (&truth, self.goal(), rests_s)
         {
             let cell = &self.setup.settings.cell;
+            let rope = (rope, self.clamp_m(plan));
             let judged = judge_seen(&goal, rope, cell, seen).map_err(anyhow::Error::msg)?;
             self.record.set_truth(truth)?;
             self.record.true_verdict = Some(judged.verdict);

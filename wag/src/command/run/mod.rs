@@ -208,11 +208,16 @@ fn on_camera(
     check_first(&entry, &address, &limits, &settings)?;
     if inputs.task != Task::Strike && !inputs.is_simulated() && !asks(arm, &address) {
         return Err(bad_input!(
-            "before a {} somebody must put board or wall in its place, and say so: leave out --yes",
+            "before a {} somebody must put board or wall in its place, and say so: add --ask",
             inputs.task.name()
         ));
     }
     let operator = operator(arm, &address)?;
+    if asks(arm, &address) && inputs.task != Task::Strike {
+        eprintln!(
+            "Board or wall of an earlier throw must be away: no move and no wiggle goes around it."
+        );
+    }
     require_clear_area(arm, &address, "MOVE")?;
     watch_interrupts().or_failed()?;
     let mut folder = RunFolder::create(out, name)?;
@@ -244,6 +249,10 @@ fn on_camera(
         let [tip_rgb, target_rgb] = inputs.colours;
         record.tip_rgb = tip_rgb.or(colours.map(|[tip_rgb, _]| tip_rgb));
         record.target_rgb = target_rgb.or(colours.map(|[_, target_rgb]| target_rgb));
+        if let Some(rig) = &rig {
+            // What an earlier run left there would be in the way.
+            session.ask(rig, &RigRequest::RemoveTarget, 5.0, |_| ())?;
+        }
         if !matches!(entry, Entry::WiggleAlone) {
             let task = inputs.task;
             let target_m = inputs.target_m.unwrap_or_else(|| random_target(task, seed));

@@ -29,7 +29,7 @@ const MOVE_SPEED: f64 = 0.04;
 /// Longest wait for the rope to hang still after a move that was planned to bring it to rest (s).
 pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 /// The same after any other move, where the swing of whatever was before decays by itself (s).
-const DECAYED_WITHIN_S: f64 = 180.0;
+pub(super) const DECAYED_WITHIN_S: f64 = 180.0;
 /// What to do where the colours to look for are not known.
 pub(super) const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
 /// How often the camera is asked for frames before the arm is enabled.
@@ -187,9 +187,9 @@ impl<'a> Run<'a> {
         };
         let throw = self.throw(&plan)?;
         if throw.frames > 0 {
-            self.score(&throw, &plan.rope);
+            self.score(&throw, &plan);
         }
-        self.compare_with_truth(&throw)?;
+        self.compare_with_truth(&throw, &plan)?;
         self.record.ok = true;
         Ok(())
     }
