@@ -13,6 +13,8 @@ use rope_sim::{BoxRegion, Scene, TaskFrame, Watch};
 use serde::{Deserialize, Serialize};
 use shared_types::{RopeParams, Task, Verdict};
 
+/// The condition that no camera sees.
+pub(super) const TOUCHED: &str = "rope touched the wall";
 /// Time before the end in which the rope must rest (s).
 const REST_S: f64 = 1.0;
 /// Movements allowed in it: of the tip's height, and of the rope's middle (m).
@@ -126,7 +128,7 @@ impl Drape {
                 rest.is_some_and(|r| r.tip_m[2] < self.target_m[2]),
             ),
             (
-                super::seen::TOUCHED,
+                TOUCHED,
                 outcome.obstacles.first().is_some_and(|wall| wall.touched()),
             ),
         ]

@@ -1,6 +1,7 @@
 //! Lobs and drapes that were made, judged by the places in which tip and middle were seen: by
 //! a camera, or by a simulation that knows them.
 
+use super::drape::TOUCHED;
 use super::{ThrowGoal, ThrowOutcome};
 use arm_model::Cell;
 use nalgebra::Vector3;
@@ -13,8 +14,6 @@ use shared_types::{RopeParams, Verdict};
 
 /// Longest time for which the tip may be unseen while it must be at rest (s).
 const UNSEEN_S: f64 = 0.3;
-/// The condition of a drape that no camera sees.
-pub(super) const TOUCHED: &str = "rope touched the wall";
 
 /// What a throw that was made came to.
 #[derive(Debug, Clone, PartialEq)]
