@@ -11,6 +11,7 @@
 #[macro_use]
 pub mod output;
 
+pub mod event;
 #[macro_use]
 mod failure;
 mod machine;

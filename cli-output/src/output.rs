@@ -7,6 +7,7 @@
 
 use std::fmt;
 use std::io::{self, ErrorKind, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// As the standard one, without its panic.
@@ -48,6 +49,7 @@ struct State {
 }
 
 static STATE: Mutex<State> = Mutex::new(State::NEW);
+static EVENTS: AtomicBool = AtomicBool::new(false);
 
 fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
@@ -87,6 +89,16 @@ pub fn is_json() -> bool {
     state().json
 }
 
+/// From here on events are told, and stages by them alone.
+pub fn tell_events() {
+    EVENTS.store(true, Ordering::Relaxed);
+}
+
+/// Whether events are told to the program that runs this one.
+pub fn tells_events() -> bool {
+    EVENTS.load(Ordering::Relaxed)
+}
+
 /// Prints text for people; with `--json` nothing.
 pub fn text(text: fmt::Arguments<'_>) {
     let mut state = state();
@@ -108,7 +120,7 @@ pub fn aside(text: fmt::Arguments<'_>) {
 
 /// Prints a line to standard error for people; with `--json` the object tells it.
 pub fn remark(line: fmt::Arguments<'_>) {
-    if !is_json() {
+    if !is_json() || tells_events() {
         aside(format_args!("{line}\n"));
     }
 }

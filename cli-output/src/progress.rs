@@ -1,6 +1,7 @@
 //! What people see while they wait: one line per stage, on standard error, and
 //! only on a terminal does it move.
 
+use crate::event::{Event, tell};
 use crate::{is_interrupted, output};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -19,6 +20,9 @@ pub struct Stage {
 impl Stage {
     /// Begins a stage; `--json` hides it altogether.
     pub fn begin(name: &'static str) -> Self {
+        tell(&Event::Stage {
+            stage: name.to_owned(),
+        });
         let quiet = output::is_json();
         let terminal = std::io::stderr().is_terminal();
         let bar = ProgressBar::new(0);
@@ -42,7 +46,14 @@ impl Stage {
 
     /// Shows a short message.
     pub fn say(&self, message: impl Into<String>) {
-        self.bar.set_message(message.into());
+        let message = message.into();
+        // Not more often than somebody reads.
+        if self.bar.message() != message {
+            tell(&Event::Progress {
+                text: message.clone(),
+            });
+        }
+        self.bar.set_message(message);
     }
 
     /// Shows how far along a long piece of work is.
@@ -75,6 +86,10 @@ impl Stage {
     /// Ends the stage with its result; returns its duration (s).
     pub fn done(&self, result: &str) -> f64 {
         let seconds = self.began.elapsed().as_secs_f64();
+        tell(&Event::Done {
+            stage: self.name.to_owned(),
+            result: result.to_owned(),
+        });
         let line = format!("✔ {:<12} {result} ({seconds:.1} s)", self.name);
         if self.plain {
             eprintln!("{line}");

@@ -64,11 +64,6 @@ pub fn number(value: f64, std_dev: Option<f64>) -> String {
     format!("{value:.decimals$}")
 }
 
-/// A standard deviation, or that the observation says nothing.
-pub fn std_dev(value: Option<f64>) -> String {
-    value.map_or_else(|| "not identifiable".to_owned(), |s| number(s, Some(s)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,11 +71,9 @@ mod tests {
     #[test]
     fn a_value_is_told_as_far_down_as_its_deviation() {
         assert_eq!(number(0.551_234_5, Some(0.001_234_5)), "0.55123");
-        assert_eq!(std_dev(Some(0.001_234_5)), "0.00123");
         assert_eq!(number(0.000_059_87, None), "0.00005987");
         assert_eq!(number(23.0, None), "23.00");
         assert_eq!(number(12_345.6, Some(250.0)), "12346");
         assert_eq!(number(0.0, None), "0.0");
-        assert_eq!(std_dev(None), "not identifiable");
     }
 }

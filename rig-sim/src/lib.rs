@@ -24,11 +24,13 @@ pub mod render;
 pub mod room;
 pub mod room_film;
 mod service;
+mod target;
 pub mod wiggle_film;
 
 pub use camera::{CameraConfig, Resolution};
 pub use config::{RigConfig, RoomChoice, check};
 pub use error::RigError;
+pub use target::random_target;
 
 use nalgebra::Vector3;
 use record::Record;

@@ -4,6 +4,7 @@
 use super::presence::{Presence, Switch};
 use super::{ProcessSpec, Received, RunFile, Supervisor};
 use anyhow::{Context, bail};
+use cli_output::event::{Event, tell};
 use cli_output::is_interrupted;
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
@@ -120,10 +121,15 @@ impl Session {
             bail!("nobody is watched who could confirm");
         };
         presence.request(word);
-        eprint!(
-            "{now} Emergency stop in reach, nobody within reach of arm and rope?\n\
-             Area clear: type {word} "
-        );
+        let question =
+            format!("{now} Emergency stop in reach, nobody within reach of arm and rope?");
+        let asked = tell(&Event::Ask {
+            word: word.to_owned(),
+            text: question.clone(),
+        });
+        if !asked {
+            eprint!("{question}\nArea clear: type {word} ");
+        }
         let began = Instant::now();
         while began.elapsed() < within {
             self.tick()?;
@@ -135,6 +141,9 @@ impl Session {
                     word,
                     at_ns: at.0,
                     at: SystemTime::now(),
+                });
+                tell(&Event::Confirmed {
+                    word: word.to_owned(),
                 });
                 eprintln!(
                     "{}",
@@ -168,7 +177,9 @@ impl Session {
         if lets_move(self) {
             return Ok(());
         }
-        eprintln!("Hold Enter down: the arm moves while it is held");
+        if !tell(&Event::Hold) {
+            eprintln!("Hold Enter down: the arm moves while it is held");
+        }
         let began = Instant::now();
         while began.elapsed() < CONFIRMED_WITHIN {
             self.tick()?;
@@ -180,10 +191,26 @@ impl Session {
         bail!("nobody held Enter down within 120 s; nothing moved for it")
     }
 
+    /// Waits as [`await_hold`](Self::await_hold) does, for a motion that is planned next: until it
+    /// begins, nothing stops when the control is released.
+    pub fn await_control(&mut self) -> anyhow::Result<()> {
+        self.await_hold()?;
+        if let Some(presence) = &mut self.presence {
+            presence.rests();
+        }
+        Ok(())
+    }
+
+    /// Whether a motion may begin at this instant, as far as the operator's control lets it.
+    pub fn is_held(&mut self) -> bool {
+        self.presence.as_mut().is_none_or(Presence::is_held)
+    }
+
     /// The motion is over: what was held may be released.
     pub fn end_hold(&mut self) {
         if let Some(presence) = &mut self.presence {
             presence.rests();
+            tell(&Event::Release);
         }
     }
 

@@ -177,6 +177,12 @@ impl Presence {
         self.typed.lets_move(now)
     }
 
+    /// Whether the switch is held as a motion needs it, and was never let go.
+    pub(crate) fn is_held(&mut self) -> bool {
+        let now = self.look();
+        !self.typed.is_let_go(now) && self.typed.is_pressed(now)
+    }
+
     /// The motion is over: a key may be released.
     pub(crate) const fn rests(&mut self) {
         self.typed.moving = false;

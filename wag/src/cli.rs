@@ -59,6 +59,10 @@ pub struct Cli {
     /// Log more to standard error (-v info, -vv debug).
     #[arg(short, long, global = true, help_heading = GLOBAL, action = clap::ArgAction::Count)]
     pub verbose: u8,
+    /// Tell the program that runs this one how far it is: one JSON object a line on standard
+    /// error, after a record separator.
+    #[arg(long, global = true, hide = true)]
+    pub events: bool,
     #[command(subcommand)]
     pub command: Command,
 }
@@ -97,6 +101,8 @@ pub enum Command {
     Latency(LatencyArgs),
     /// Live web view of a run: arm, rope, camera, control loop.
     Watch(WatchArgs),
+    /// The page where one works: target, wiggle, plan, throw, result, history.
+    Studio(StudioArgs),
     /// Attach to a running controller and record every one of its cycles.
     Record(RecordArgs),
     /// Replay a recorded run through the controller's core, compared bit-exactly.

@@ -34,6 +34,9 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return cli_output::refuse_usage(&error),
     };
+    if cli.events {
+        cli_output::output::tell_events();
+    }
     cli_output::start(cli.json, cli.verbose);
     if let Some(file) = &cli.cell {
         config::name_cell(file);

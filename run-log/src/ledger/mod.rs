@@ -11,9 +11,18 @@ pub use export::{csv, table};
 use crate::files::{self, cannot_read};
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// Where runs lie by default.
 pub const RUNS: &str = "runs";
+
+/// A name for the folder of a run that begins now: the time, what is run, this process.
+#[must_use]
+pub fn new_name(what: &str) -> String {
+    let now = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
+    let stamp: String = now.chars().filter(|c| !matches!(c, ':' | '-')).collect();
+    format!("{stamp}-{what}-{}", std::process::id())
+}
 
 /// The runs in `places`: each is a run folder, or a folder of run folders. In order
 /// of their names, which begin with the time.

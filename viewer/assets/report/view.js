@@ -156,6 +156,27 @@ class View {
     this.paint(this.line, new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]), colour, kind, false);
   }
 
+  /** Arm and pole; `part` of their thickness, in the colour of what is planned, where they are to come. */
+  body(arm, poleRadius, part = 0) {
+    const last = arm.length - 1, thin = part || 1;
+    for (let i = 0; i < last; i++) {
+      const pole = i === last - 1;
+      const colour = part ? [0.85, 0.62, 0.2] : pole ? [0.2, 0.2, 0.22] : [0.86, 0.88, 0.9];
+      this.rod(arm[i], arm[i + 1], thin * (pole ? poleRadius : 0.055 - 0.003 * i), colour);
+      if (!pole) this.sphere(arm[i + 1], thin * (0.058 - 0.003 * i), part ? colour : [0.35, 0.37, 0.4]);
+    }
+  }
+
+  /** Rope and lead. */
+  string(rope, [radius, leadRadius], planned = false) {
+    const colour = planned ? [0.85, 0.62, 0.2] : [0.72, 0.38, 0.2];
+    for (let i = 0; i + 1 < rope.length; i++) {
+      this.rod(rope[i], rope[i + 1], radius, colour, this.thin);
+      if (i + 2 < rope.length) this.sphere(rope[i + 1], radius, colour, this.bead);
+    }
+    if (rope.length) this.sphere(rope[rope.length - 1], leadRadius, planned ? colour : [0.25, 0.7, 0.2]);
+  }
+
   /** Shows a scene at a frame, or between two. */
   show(scene, frame) { this.scene = scene; this.now = frame; this.draw(); }
 
@@ -177,18 +198,14 @@ class View {
     }
     this.way(grid, [0.55, 0.58, 0.62], gl.LINES);
     this.rod([0, 0, floor], [0, 0, 0], half, [0.5, 0.52, 0.55]);
-    const arm = points(blend(scene.arm, this.now)), last = arm.length - 1;
-    for (let i = 0; i < last; i++) {
-      const pole = i === last - 1;
-      this.rod(arm[i], arm[i + 1], pole ? poleRadius : 0.055 - 0.003 * i, pole ? [0.2, 0.2, 0.22] : [0.86, 0.88, 0.9]);
-      if (!pole) this.sphere(arm[i + 1], 0.058 - 0.003 * i, [0.35, 0.37, 0.4]);
-    }
+    this.body(points(blend(scene.arm, this.now)), poleRadius);
     const rope = points(blend(scene.rope, this.now));
-    for (let i = 0; i + 1 < rope.length; i++) {
-      this.rod(rope[i], rope[i + 1], scene.radii_m[0], [0.72, 0.38, 0.2], this.thin);
-      if (i + 2 < rope.length) this.sphere(rope[i + 1], scene.radii_m[0], [0.72, 0.38, 0.2], this.bead);
+    this.string(rope, scene.radii_m);
+    if (scene.ghost) {
+      // Thinner, so that what is there stays in sight.
+      this.body(points(scene.ghost.arm), poleRadius, 0.4);
+      this.string(points(scene.ghost.rope), scene.ghost.radii_m, true);
     }
-    if (rope.length) this.sphere(rope[rope.length - 1], scene.radii_m[1], [0.25, 0.7, 0.2]);
     const tips = (scene.tips || scene.rope.slice(0, Math.floor(this.now) + 1)).map((f) => points(f.slice(-3))[0]).filter(Boolean);
     if (!scene.tips && rope.length) tips.push(rope[rope.length - 1]);
     if (tips.length > 1) this.way(tips, [0.2, 0.62, 0.16], gl.LINE_STRIP);

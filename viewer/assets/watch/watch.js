@@ -13,6 +13,10 @@ let tips = [], shownAsks = "", shownController = "", shownStage = "";
 /** Longer without a new picture, the one in view is no longer live (ms). */
 const OLD_MS = 1500;
 let caption = "", pictured = null, framed = false;
+/** The scene in view, and what a page that loads this draws beside it. */
+let scene = { cell: null, arm: [[]], rope: [[]], tips: [], planned_tip: [], radii_m: [0, 0] };
+const beside = {};
+const paint = () => { if (scene.cell) view.show({ ...scene, ...beside }, 0); };
 byId("eyebuttons").replaceChildren(...eyeButtons(view));
 
 function controller(c) {
@@ -100,7 +104,8 @@ function frameOnce(s) {
 function draw(s) {
   byId("title").textContent = s.title;
   byId("note").textContent = s.note;
-  view.show({ cell: s.cell, arm: [s.arm], rope: [s.rope], tips, planned_tip: [], radii_m: s.radii_m, target_m: s.target_m }, 0);
+  scene = { cell: s.cell, arm: [s.arm], rope: [s.rope], tips, planned_tip: [], radii_m: s.radii_m, target_m: s.target_m };
+  paint();
   byId("viewnote").textContent = `${HANDLING} Rope: ${s.rope_is || "none"}.` +
     (view.gl ? "" : " This browser has no WebGL, so nothing is drawn.");
   frameOnce(s);
@@ -111,14 +116,18 @@ function draw(s) {
   watched.drawn++;
 }
 
+/** Least time between two drawings (ms), where a page that loads this has something more urgent. */
+let pace_ms = () => 0;
 /** Draws once for each frame of the screen, the newest state only. */
-let newest = null;
+let newest = null, drawn_ms = 0;
 function show(s) {
   if (s.jitter) jitter(s.jitter, s.missed);
   const tip = s.rope.slice(-3);
   tips = tip.length ? [...tips, tip].slice(-TIPS_MAX) : [];
-  if (!newest) requestAnimationFrame(() => { const s = newest; newest = null; draw(s); });
-  newest = s;
+  if (!newest && performance.now() - drawn_ms >= pace_ms()) {
+    requestAnimationFrame(() => { const s = newest; newest = null; drawn_ms = performance.now(); draw(s); });
+    newest = s;
+  } else if (newest) newest = s;
   watched.states++;
   watched.last = s;
 }
@@ -159,6 +168,7 @@ async function pictures() {
       pictured = performance.now();
       showAge();
       watched.pictures++;
+      await wait(pace_ms());
     } catch { await wait(1000); }
   }
 }

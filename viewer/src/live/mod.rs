@@ -6,6 +6,7 @@
 
 mod ask;
 mod attached;
+mod desk;
 mod facts;
 mod film;
 mod http;
@@ -19,7 +20,10 @@ mod snapshot;
 mod stage;
 mod token;
 
+pub use desk::{Asked, Desk};
 pub use facts::domain_of_run;
+pub use http::Reply;
+pub use page::{IDS, script, style};
 
 use crate::report::{arm_points, tenths_mm};
 use ask::{Ask, Open, Requested, hand_over};
@@ -89,7 +93,7 @@ pub struct Watcher {
 }
 
 impl Watcher {
-    /// Begins to serve; returns the page's address.
+    /// Begins to serve, with what a desk offers beside; returns the page's address.
     ///
     /// # Errors
     /// Nothing can be listened to there, or the domain cannot be joined.
@@ -97,13 +101,14 @@ impl Watcher {
         wanted: Wanted,
         bind: SocketAddr,
         here: CellHere,
+        desk: Option<Arc<dyn Desk>>,
     ) -> anyhow::Result<(Self, String)> {
         let (sender, asks) = mpsc::channel();
         let attached = match &wanted {
             Wanted::Newest => None,
             Wanted::Domain(domain, _) => Some(Attached::join(domain)?),
         };
-        let (url, site) = http::serve(bind, sender)?;
+        let (url, site) = http::serve(bind, sender, desk)?;
         let watcher = Self {
             wanted,
             here,

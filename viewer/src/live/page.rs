@@ -3,16 +3,39 @@
 use crate::report::{PLOTS, STYLE, VIEW};
 use std::sync::LazyLock;
 
+/// What the scripts of the live page find by name in the page that loads them.
+pub const IDS: [&str; 17] = [
+    "title",
+    "note",
+    "asking",
+    "asks",
+    "asknote",
+    "answer",
+    "stages",
+    "view",
+    "eyebuttons",
+    "viewnote",
+    "eye",
+    "picture",
+    "picturenote",
+    "controller",
+    "loopnote",
+    "jitter",
+    "pair",
+];
+
 pub(crate) const HTML: &str = include_str!("../../assets/watch/page.html");
 const OWN_STYLE: &str = include_str!("../../assets/watch/watch.css");
 const OWN_SCRIPT: &str = include_str!("../../assets/watch/watch.js");
 
-pub(crate) fn script() -> &'static str {
+/// The scripts of the live page, in the order in which they are loaded.
+pub fn script() -> &'static str {
     static WHOLE: LazyLock<String> = LazyLock::new(|| [VIEW, PLOTS, OWN_SCRIPT].join("\n"));
     &WHOLE
 }
 
-pub(crate) fn style() -> &'static str {
+/// Colours and layout of the live page.
+pub fn style() -> &'static str {
     static WHOLE: LazyLock<String> = LazyLock::new(|| [STYLE, OWN_STYLE].join("\n"));
     &WHOLE
 }

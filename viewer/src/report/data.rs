@@ -55,9 +55,12 @@ pub(crate) struct Errors {
 
 /// One parameter of the rope.
 #[derive(Debug, Serialize)]
-pub(crate) struct RopeRow {
+pub struct RopeRow {
+    /// Its name.
     pub label: &'static str,
+    /// Its unit.
     pub unit: &'static str,
+    /// In that unit.
     pub value: f64,
     /// Interval that holds it with a probability of 90 %.
     pub interval_90: Option<[f64; 2]>,

@@ -9,7 +9,7 @@ const PLANNED_MAX: usize = 6;
 
 /// One limit, and what came closest to it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct LimitRow {
+pub struct LimitRow {
     /// What the limit is about.
     pub what: &'static str,
     /// The motion in which it was closest; none between motions.

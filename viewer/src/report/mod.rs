@@ -13,13 +13,16 @@ mod limits;
 mod names;
 mod page;
 mod pictures;
+mod planned;
 mod read;
 mod replay;
 
-pub use data::Histogram;
+pub use data::{Histogram, RopeRow};
 pub use latency::histogram;
+pub use limits::LimitRow;
 pub use page::{PLOTS, STYLE, VIEW};
-pub use read::simulated_rope;
+pub use planned::PlannedMotion;
+pub use read::{rope_rows, simulated_rope};
 pub use replay::{arm_points, tenths_mm};
 
 use anyhow::ensure;

@@ -182,7 +182,10 @@ fn value<T: DeserializeOwned>(found: &Value) -> Option<T> {
 
 /// Rows of a rope with the intervals in its file; `truth` is what a simulated rig said
 /// about it.
-fn rope_rows(params: &RopeParams, path: &Path, truth: &Value) -> anyhow::Result<Vec<RopeRow>> {
+///
+/// # Errors
+/// The file is wrong.
+pub fn rope_rows(params: &RopeParams, path: &Path, truth: &Value) -> anyhow::Result<Vec<RopeRow>> {
     let table: toml::Table = toml::from_str(&files::read_text(path)?)
         .with_context(|| format!("rope file `{}`", path.display()))?;
     let interval = |key: &str| {

@@ -128,7 +128,7 @@ pub(crate) fn scene(
     })
 }
 
-fn frames(span_s: f64) -> FrameTimes {
+pub(super) fn frames(span_s: f64) -> FrameTimes {
     FrameTimes {
         first_s: 0.0,
         period_s: 1.0 / RATE_HZ,
@@ -183,7 +183,7 @@ fn finer(frames: FrameTimes, rate: usize) -> FrameTimes {
 }
 
 /// The rope in every frame, from hanging still in the first; none when it cannot be simulated.
-fn simulate(
+pub(super) fn simulate(
     around: &rope_sim::Scene,
     rope: &RopeParams,
     motion: &dyn AttachMotion,
@@ -211,7 +211,7 @@ fn tips(rope: &NodeTrack) -> Vec<Vector3<f64>> {
 }
 
 /// Nodes of every `rate`th frame, as the page reads them.
-fn rows(rope: &NodeTrack, rate: usize) -> Vec<Vec<i32>> {
+pub(super) fn rows(rope: &NodeTrack, rate: usize) -> Vec<Vec<i32>> {
     let node = |frame, node| tenths_mm(&rope.position(frame, node));
     (0..rope.frames())
         .step_by(rate)

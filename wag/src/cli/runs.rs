@@ -1,8 +1,11 @@
 //! The commands that look at one run.
 
-use super::values::span_s;
+use super::values::{TASKS, host, one_of, span_s};
+use super::{ArmPorts, CameraArgs};
 use clap::{Args, Subcommand};
-use std::net::SocketAddr;
+use cli_output::seed;
+use shared_types::Task;
+use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -81,4 +84,47 @@ pub enum ExportCommand {
         #[arg(long)]
         out: Option<PathBuf>,
     },
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "EXAMPLES:\n  \
+    wag studio                      on a simulated rig of its own\n  \
+    wag studio --arm 192.168.1.200 --camera /dev/video0 --target-rgb 38,168,74\n\n\
+    Limits and measured response come from the folder of configurations. The address that it \
+    prints holds a secret: a page on this machine is the operator, who answers what a run asks and \
+    holds the control that lets the arm move. From another machine one looks and stops, not more.")]
+pub struct StudioArgs {
+    /// Address or name of the arm's controller. Default: a simulated rig.
+    #[arg(long = "arm", value_name = "ADDR", value_parser = host, requires = "camera")]
+    pub address: Option<IpAddr>,
+    /// Controller that runs as a service, by its shared-memory domain.
+    #[arg(
+        long,
+        value_name = "NAME",
+        conflicts_with = "address",
+        requires = "camera"
+    )]
+    pub controller: Option<String>,
+    #[command(flatten)]
+    pub ports: ArmPorts,
+    #[command(flatten)]
+    pub camera: CameraArgs,
+    /// Colour of the target, or of a lob's domino, R,G,B from 0 to 255.
+    #[arg(long)]
+    pub target_rgb: Option<String>,
+    /// Who operates the arm, for the runs' records. Default: the user's name.
+    #[arg(long, value_name = "NAME")]
+    pub operator: Option<String>,
+    /// What throws on the simulated rig are for: its camera stands so that it sees that.
+    #[arg(long, default_value = "strike", value_parser = one_of(TASKS))]
+    pub task: Task,
+    /// Seed of the simulated rig's rope and noise.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    pub seed: u64,
+    /// Folder of the runs.
+    #[arg(long, value_name = "DIR", default_value = run_log::ledger::RUNS)]
+    pub runs: PathBuf,
+    /// Address and port of the page; port 0 takes any free one.
+    #[arg(long, value_name = "ADDR:PORT", default_value = "127.0.0.1:0")]
+    pub bind: SocketAddr,
 }

@@ -1,14 +1,14 @@
 //! `wag demo`: one throw from start to end on a simulated rig that is started for it.
 
 use super::plan_again::{LastThrow, check_thrown};
-use super::run::{Entry, Run, Setup, check_target, in_folder, random_target};
+use super::run::{Entry, Run, Setup, check_target, in_folder};
 use crate::cli::DemoArgs;
 use crate::config;
 use crate::pipeline::{self, FramesFrom, RunFolder};
 use arm_model::Limits;
 use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use planner::PlannerConfig;
-use rig_sim::RigConfig;
+use rig_sim::{RigConfig, random_target};
 use run_log::RunRecord;
 use serde_json::Value;
 use shared_types::Task;
@@ -59,7 +59,6 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
             limits,
             address,
             asks: false,
-            held: false,
             acknowledges: false,
             frames: FramesFrom::Domain(folder.domain.clone()),
             camera: rig_config.camera.stereo_camera(),

@@ -179,23 +179,37 @@ fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     })
 }
 
-fn parameter_table(estimate: &RopeEstimate) -> Table {
-    let values = RANGES
-        .iter()
-        .zip(estimate.params.to_array())
-        .zip(estimate.std_dev)
-        .zip(estimate.posterior.interval_90);
-    let rows = values.map(|(((range, value), std_dev), [low, high])| {
-        [
-            range.label.to_owned(),
-            format!("{value:.4}"),
-            table::std_dev(std_dev),
-            format!("{low:.4} to {high:.4}"),
-            range.unit.to_owned(),
-        ]
+/// What was identified, beside the truth where a rig tells it.
+pub fn parameter_table(estimate: &RopeEstimate, truth: Option<&RopeParams>) -> Table {
+    let found = estimate.params.to_array();
+    let number = |i: usize, value| table::number(value, estimate.std_dev[i]);
+    let cells = |i: usize| {
+        let [low, high] = estimate.posterior.interval_90[i];
+        let interval = estimate.std_dev[i].map_or_else(
+            || "not identifiable".to_owned(),
+            |_| format!("{} to {}", number(i, low), number(i, high)),
+        );
+        let (range, found) = (&RANGES[i], number(i, found[i]));
+        let [name, unit] = [range.label, range.unit].map(str::to_owned);
+        [name, found, interval, unit]
+    };
+    let rows = 0..RANGES.len();
+    let Some(truth) = truth.map(RopeParams::to_array) else {
+        let header = ["parameter", "identified", "90 % interval", "unit"];
+        return table::numbers(header, 1, rows.map(cells));
+    };
+    let header = [
+        "parameter",
+        "identified",
+        "90 % interval",
+        "hidden truth",
+        "unit",
+    ];
+    let beside = rows.map(|i| {
+        let [name, value, interval, unit] = cells(i);
+        [name, value, interval, number(i, truth[i]), unit]
     });
-    let header = ["parameter", "identified", "± std", "90 % interval", "unit"];
-    table::numbers(header, 1, rows)
+    table::numbers(header, 1, beside)
 }
 
 /// What the film leaves open, in words: a parameter, or a combination of some.
@@ -291,7 +305,7 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
     files::write_rope_estimate(&args.out, &estimate, &observed.track.unconfirmed).or_failed()?;
     println!(
         "{}\nresidual {:.2} px -> `{}`",
-        parameter_table(&estimate),
+        parameter_table(&estimate, None),
         estimate.residual_px,
         args.out.display()
     );

@@ -30,6 +30,7 @@ mod run;
 mod runs;
 mod score;
 mod sim;
+mod studio;
 mod throw;
 mod track;
 mod unconfirmed;
@@ -91,6 +92,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Throw(args) => throw::run(args),
         Command::Latency(args) => latency::run(args),
         Command::Watch(args) => watch::run(args),
+        Command::Studio(args) => studio::run(cli, args),
         Command::Record(args) => record::run(args),
         Command::Replay { run, from_cycle } => runs::replay(run, *from_cycle),
         Command::Explain { run } => runs::explain(run),

@@ -2,7 +2,7 @@
 
 use anyhow::Context;
 use cli_output::{OrInput, Outcome};
-use run_log::{CommandLine, files};
+use run_log::{CommandLine, files, ledger};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -18,11 +18,7 @@ impl RunFolder {
     pub fn create(out: Option<&Path>, name: &str) -> Outcome<Self> {
         let path = match out {
             Some(path) => path.to_owned(),
-            None => {
-                let now = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
-                let stamp: String = now.chars().filter(|c| !matches!(c, ':' | '-')).collect();
-                PathBuf::from("runs").join(format!("{stamp}-{name}-{}", std::process::id()))
-            }
+            None => Path::new(ledger::RUNS).join(ledger::new_name(name)),
         };
         Self::refuse_existing(&path)?;
         crate::config::check_here().or_input()?;

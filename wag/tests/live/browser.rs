@@ -1,5 +1,5 @@
 //! What a real browser makes of the report and of the live page, without a network.
-//! Where there is no Chromium, these say so and pass; the server's tests always run.
+//! Where there is no Chromium, these say so and pass, but not in CI.
 
 use super::chromium::Chromium;
 use super::client::Watch;

@@ -45,12 +45,13 @@ pub(crate) struct Chromium {
 
 impl Chromium {
     /// Starts one that can reach nothing but this machine; `None`, and a word on
-    /// standard error, where there is none.
+    /// standard error, where there is none. In CI there must be one.
     pub(crate) fn start() -> Option<Self> {
         let Some(program) = program() else {
-            eprintln!(
-                "no chromium on this machine (PATH, WAG_CHROMIUM): the page was not looked at"
-            );
+            let said =
+                "no chromium on this machine (PATH, WAG_CHROMIUM): the page was not looked at";
+            assert!(std::env::var_os("CI").is_none(), "{said}");
+            eprintln!("{said}");
             return None;
         };
         let folder = tempfile::tempdir().unwrap();
@@ -157,6 +158,27 @@ impl Chromium {
             assert!(began.elapsed() < PATIENCE, "{what} never came");
             std::thread::sleep(Duration::from_millis(50));
         }
+    }
+
+    /// The middle of an element in the window (CSS pixels), brought into view.
+    pub(crate) fn middle_of(&mut self, id: &str) -> [f64; 2] {
+        let place = self.value(&format!(
+            "(() => {{ const e = document.getElementById('{id}'); e.scrollIntoView({{ block: 'center' }});
+             const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
+        ));
+        [0, 1].map(|i| place[i].as_f64().unwrap())
+    }
+
+    /// A mouse event: `mousePressed`, `mouseMoved`, `mouseReleased`.
+    pub(crate) fn mouse(&mut self, kind: &str, [x, y]: [f64; 2]) {
+        let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1 });
+        self.call("Input.dispatchMouseEvent", &event);
+    }
+
+    /// Presses and releases there.
+    pub(crate) fn click(&mut self, place: [f64; 2]) {
+        self.mouse("mousePressed", place);
+        self.mouse("mouseReleased", place);
     }
 
     /// Keeps a picture of the window as PNG in `WAG_SCREENSHOTS`, if that names a folder.

@@ -8,5 +8,6 @@ mod client;
 mod fake;
 mod preview;
 mod server;
+mod studio;
 #[path = "../support/mod.rs"]
 mod support;

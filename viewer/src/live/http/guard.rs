@@ -32,7 +32,7 @@ pub(crate) fn admit<'a>(
     } else {
         Err(Unread::Refused(
             403,
-            "the address lacks the token that `wag watch` printed",
+            "the address lacks the token that the command printed",
         ))
     }
 }

@@ -9,13 +9,15 @@ mod reply;
 mod request;
 
 use super::ask::{Ask, Requested};
+use super::desk::{Asked, Desk};
 use super::film::Picture;
 use super::newest::Newest;
 use super::page;
 use super::token::Token;
 use anyhow::Context;
 use guard::admit;
-use reply::{Reply, begin_events, end_unread};
+pub use reply::Reply;
+use reply::{begin_events, end_unread};
 use request::Unread;
 use std::io::Write;
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
@@ -35,8 +37,8 @@ const PICTURE_PATIENCE: Duration = Duration::from_secs(1);
 const PICTURE_WANTED: Duration = Duration::from_secs(3);
 /// How long the controller may take to answer.
 const ANSWER_PATIENCE: Duration = Duration::from_secs(8);
-/// Stack of a connection's thread (bytes).
-const STACK_BYTES: usize = 256 * 1024;
+/// Stack of a connection's thread (bytes): a desk may simulate a rope on it.
+const STACK_BYTES: usize = 4 * 1024 * 1024;
 
 /// What the server hands out, and where requests go.
 #[derive(Debug)]
@@ -47,6 +49,8 @@ pub(crate) struct Site {
     pub state: Newest<String>,
     pub pictures: Newest<Picture>,
     asks: Mutex<mpsc::Sender<Requested>>,
+    /// What its pages offer beside looking on.
+    desk: Option<Arc<dyn Desk>>,
     picture_asked: Mutex<Option<Instant>>,
     connections: AtomicUsize,
     followers: AtomicUsize,
@@ -86,6 +90,7 @@ impl Drop for Place<'_> {
 pub(crate) fn serve(
     bind: SocketAddr,
     asks: mpsc::Sender<Requested>,
+    desk: Option<Arc<dyn Desk>>,
 ) -> anyhow::Result<(String, Arc<Site>)> {
     let listener = TcpListener::bind(bind).with_context(|| {
         format!("cannot listen on {bind}; name another address or port with --bind")
@@ -99,6 +104,7 @@ pub(crate) fn serve(
         state: Newest::default(),
         pictures: Newest::default(),
         asks: Mutex::new(asks),
+        desk,
         picture_asked: Mutex::new(None),
         connections: AtomicUsize::new(0),
         followers: AtomicUsize::new(0),
@@ -140,6 +146,9 @@ fn accept(listener: &TcpListener, site: &Arc<Site>) {
 /// Answers one request after the other.
 fn converse(stream: &TcpStream, site: &Site) {
     let mut rest = Vec::new();
+    let is_local = stream
+        .peer_addr()
+        .is_ok_and(|peer| peer.ip().to_canonical().is_loopback());
     loop {
         let request = request::read(stream, &mut rest);
         let done = request.and_then(|request| {
@@ -147,7 +156,16 @@ fn converse(stream: &TcpStream, site: &Site) {
             let done = match (request.method.as_str(), path) {
                 ("GET", Some("state")) => follow(stream, site),
                 (method, path) => {
-                    answer(site, method, path, &request.query).write(stream, request.keep)
+                    let asked = Asked {
+                        method,
+                        path: path.unwrap_or(""),
+                        query: &request.query,
+                        is_local,
+                    };
+                    let desk = site.desk.as_ref().filter(|_| path.is_some());
+                    let reply = desk.and_then(|desk| desk.answer(&asked));
+                    let reply = reply.unwrap_or_else(|| answer(site, method, path, &request.query));
+                    reply.write(stream, request.keep)
                 }
             };
             Ok(done.is_ok() && request.keep)

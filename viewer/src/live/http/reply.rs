@@ -4,37 +4,70 @@ use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::time::Duration;
 
-/// Said with every answer: kept nowhere, framed by nobody, loads nothing from elsewhere.
+/// Said with every answer: kept nowhere.
 const COMMON: &str = "Cache-Control: no-store\r\n\
     X-Content-Type-Options: nosniff\r\n\
     Referrer-Policy: no-referrer\r\n\
-    Cross-Origin-Resource-Policy: same-origin\r\n\
-    Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; \
-    connect-src 'self'; img-src data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\n";
+    Cross-Origin-Resource-Policy: same-origin\r\n";
+/// What a page of this server may do: it loads nothing from elsewhere and is framed by nobody.
+/// Another page of the server may stand in a frame of its own.
+const OF_PAGES: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
+    connect-src 'self'; img-src data:; frame-src 'self'; frame-ancestors 'none'; \
+    base-uri 'none'; form-action 'none'";
+/// What a document may do that a run folder holds: run what it contains, reach nobody, not even
+/// this server, and stand in a page of this server.
+const OF_DOCUMENTS: &str = "default-src 'none'; script-src 'unsafe-inline'; \
+    style-src 'unsafe-inline'; img-src data:; sandbox allow-scripts; frame-ancestors 'self'; \
+    base-uri 'none'; form-action 'none'";
 
 /// An answer of known length.
 #[derive(Debug)]
-pub(crate) struct Reply {
-    pub status: u16,
+pub struct Reply {
+    pub(crate) status: u16,
     /// Type of the body.
-    pub kind: &'static str,
+    pub(crate) kind: &'static str,
     /// Further header lines, each with its end.
-    pub more: String,
-    pub body: Vec<u8>,
+    pub(crate) more: String,
+    pub(crate) body: Vec<u8>,
+    pub(crate) policy: &'static str,
 }
 
 impl Reply {
     /// A whole answer of a type.
-    pub(crate) fn of(kind: &'static str, body: impl Into<Vec<u8>>) -> Self {
+    pub fn of(kind: &'static str, body: impl Into<Vec<u8>>) -> Self {
         Self {
             status: 200,
             kind,
             more: String::new(),
             body: body.into(),
+            policy: OF_PAGES,
         }
     }
 
-    pub(crate) fn said(status: u16, text: &str) -> Self {
+    /// A report of a run: its scripts run, and reach nobody.
+    pub fn document(html: impl Into<Vec<u8>>) -> Self {
+        Self {
+            policy: OF_DOCUMENTS,
+            ..Self::of("text/html; charset=utf-8", html)
+        }
+    }
+
+    /// A value.
+    pub fn json(value: &impl serde::Serialize) -> Self {
+        match serde_json::to_vec(value) {
+            Ok(body) => Self::of("application/json", body),
+            Err(error) => Self::said(500, &error.to_string()),
+        }
+    }
+
+    /// Its status.
+    #[must_use]
+    pub const fn status(&self) -> u16 {
+        self.status
+    }
+
+    /// A line of text with a status.
+    pub fn said(status: u16, text: &str) -> Self {
         Self {
             status,
             ..Self::of("text/plain; charset=utf-8", text)
@@ -43,12 +76,13 @@ impl Reply {
 
     pub(crate) fn write(&self, mut to: &TcpStream, keep: bool) -> std::io::Result<()> {
         let head = format!(
-            "HTTP/1.1 {} {}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: {}\r\n{}{COMMON}\r\n",
+            "HTTP/1.1 {} {}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: {}\r\nContent-Security-Policy: {}\r\n{}{COMMON}\r\n",
             self.status,
             reason(self.status),
             self.kind,
             self.body.len(),
             if keep { "keep-alive" } else { "close" },
+            self.policy,
             self.more,
         );
         to.write_all(&[head.as_bytes(), &self.body].concat())
@@ -88,6 +122,7 @@ fn reason(status: u16) -> &'static str {
         409 => "Conflict",
         413 => "Content Too Large",
         431 => "Request Header Fields Too Large",
+        500 => "Internal Server Error",
         503 => "Service Unavailable",
         _ => "Error",
     }

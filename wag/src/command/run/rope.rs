@@ -6,7 +6,7 @@ use crate::command::known_rope::KnownRope;
 use crate::command::network::warning_of_pole;
 use crate::command::plan::describe;
 use crate::command::unconfirmed::confirm;
-use crate::pipeline::{arm_simulated, execute};
+use crate::pipeline::{arm_for, execute};
 use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use cli_output::Stage;
@@ -30,6 +30,8 @@ const KEYPOINTS: u32 = 24;
 /// Time allowed for planning before the settling move begins (s); longer after a plan
 /// that came too late. The swing decays meanwhile: to wait spoils nothing.
 const SETTLING_S: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
+/// What an operator confirms before it.
+const SETTLES: &str = "The arm will move to the throw's start and damp the rope's swing.";
 /// Time after which the answer about a settling move is not waited for any longer (s).
 const SETTLED_S: f64 = 60.0;
 /// From the call to the first setpoint, on average (s): half a turn of the
@@ -215,7 +217,8 @@ impl Run<'_> {
     }
 
     /// Turns towards the target so that the rope comes to rest: by a move planned with the
-    /// identified rope and begun at the instant it was planned for.
+    /// identified rope and begun at the instant it was planned for. It is planned once the
+    /// operator has confirmed it, and holds the control where there is one.
     pub fn settle(
         &mut self,
         rope: &RopeParams,
@@ -227,8 +230,15 @@ impl Run<'_> {
         let lag_s = self.record.arm_lag_s;
         let mut settled = None;
         for planning_s in SETTLING_S {
+            let confirmed_ns = self.confirm_move(SETTLES)?;
+            self.session.await_control()?;
             let begin = MonotonicNs(now_ns()).plus_s(planning_s);
-            settled = self.settle_at((begin, lag_s), (rope, film, wiggle, plan), &stage)?;
+            settled = self.settle_at(
+                (begin, lag_s, confirmed_ns),
+                (rope, film, wiggle, plan),
+                &stage,
+            )?;
+            self.session.end_hold();
             if settled.is_some() {
                 break;
             }
@@ -252,7 +262,7 @@ impl Run<'_> {
     /// and makes it; `None` when the plan came too late.
     fn settle_at(
         &mut self,
-        (begin, lag_s): (MonotonicNs, Option<f64>),
+        (begin, lag_s, confirmed_ns): (MonotonicNs, Option<f64>, u64),
         (rope, film, wiggle, plan): (&RopeParams, &Film, &JointTrajectory, &Plan),
         stage: &Stage,
     ) -> anyhow::Result<Option<Settled>> {
@@ -288,10 +298,14 @@ impl Run<'_> {
         if left_s() < 0.0 {
             return Ok(None);
         }
-        arm_simulated(self.session, &self.arm, OperatingMode::Wiggle)?;
+        let mode = OperatingMode::Wiggle;
+        arm_for(self.session, &self.arm, mode, Some(confirmed_ns))?;
         let early = Duration::from_secs_f64((left_s() - 0.03).max(0.0));
         self.session.idle(early)?;
         std::thread::sleep(Duration::from_secs_f64(left_s().max(0.0)));
+        if !self.session.is_held() {
+            return Ok(None);
+        }
         let span = execute(self.session, &self.arm, &found.trajectory)?;
         Ok(Some(Settled {
             plain_residual_m: found.plain_residual_m,

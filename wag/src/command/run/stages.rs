@@ -55,8 +55,6 @@ pub struct Setup {
     pub address: ArmAddress,
     /// Whether the operator must confirm each motion.
     pub asks: bool,
-    /// Whether the operator holds a key for each motion, which no planned instant can wait for.
-    pub held: bool,
     /// Whether the operator knows why the arm was stopped before.
     pub acknowledges: bool,
     pub frames: FramesFrom,
@@ -177,11 +175,7 @@ impl<'a> Run<'a> {
                 let (motion, film, appearance) = self.tracked()?;
                 let rope = self.identify(&film, appearance)?;
                 let plan = self.plan(&rope)?;
-                if self.setup.asks || self.setup.held {
-                    self.turn(&plan)?;
-                } else {
-                    self.settle(&rope.params, &film, &motion, &plan)?;
-                }
+                self.settle(&rope.params, &film, &motion, &plan)?;
                 plan
             }
         };
@@ -248,12 +242,11 @@ impl<'a> Run<'a> {
         pipeline::arm_for(self.session, &self.arm, operating_mode, Some(confirmed_ns))
     }
 
-    /// Lets the operator confirm a move that begins minutes after what was confirmed before.
-    fn confirm_move(&mut self, what: &str) -> anyhow::Result<()> {
-        if self.setup.asks {
-            self.session.confirm(what, "MOVE")?;
-        }
-        Ok(())
+    /// Lets the operator confirm a move that begins minutes after what was confirmed before;
+    /// when that was (CLOCK_MONOTONIC, ns), or now where nobody is asked.
+    pub(super) fn confirm_move(&mut self, what: &str) -> anyhow::Result<u64> {
+        let asked = self.setup.asks.then(|| self.session.confirm(what, "MOVE"));
+        Ok(asked.transpose()?.unwrap_or_else(now_ns))
     }
 
     /// Enables the arm, moves to the start pose, waits for the rope.
@@ -284,15 +277,6 @@ impl<'a> Run<'a> {
                 "the rope still swings after {DECAYED_WITHIN_S} s, and what follows takes it to hang still"
             ));
         }
-        Ok(())
-    }
-
-    /// Turns to the throw's start.
-    fn turn(&mut self, plan: &Plan) -> anyhow::Result<()> {
-        self.confirm_move("The arm will move to the throw's start.")?;
-        let stage = Stage::begin("settle");
-        self.move_to_start(&plan.trajectory, &stage)?;
-        self.record.stages.settle_s = stage.done("arm stands at the throw's start");
         Ok(())
     }
 }

@@ -1,26 +1,9 @@
 //! What a run shows at its end.
 
+use crate::command::identify::parameter_table;
 use crate::command::latency::loop_table;
-use cli_output::table;
-use comfy_table::Table;
 use run_log::{Film, RunRecord};
-use shared_types::rope::{RANGES, ROPE_PARAMETERS};
-use shared_types::{RopeEstimate, RopeParams, Task};
-
-fn rope_table(estimate: &RopeEstimate, truth: &RopeParams) -> Table {
-    let (found, real) = (estimate.params.to_array(), truth.to_array());
-    let rows = (0..ROPE_PARAMETERS).map(|i| {
-        [
-            RANGES[i].label.to_owned(),
-            table::number(found[i], estimate.std_dev[i]),
-            table::std_dev(estimate.std_dev[i]),
-            table::number(real[i], estimate.std_dev[i]),
-            RANGES[i].unit.to_owned(),
-        ]
-    });
-    let header = ["parameter", "identified", "± std", "hidden truth", "unit"];
-    table::numbers(header, 1, rows)
-}
+use shared_types::Task;
 
 /// One line about a film.
 pub fn of_film(film: &Film) -> String {
@@ -29,7 +12,7 @@ pub fn of_film(film: &Film) -> String {
 
 pub fn show(record: &RunRecord) {
     if let (Some(estimate), Some(truth)) = (&record.identified, &record.true_rope) {
-        println!("{}", rope_table(estimate, truth));
+        println!("{}", parameter_table(estimate, Some(truth)));
         println!(
             "Only ratios of stiffness, damping and masses show in a film, so their common scale is a guess.\n"
         );

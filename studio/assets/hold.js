@@ -1,0 +1,44 @@
+// The hold-to-run control: while it is held, and only then, the arm is let move.
+
+/** Time between two signs (ms); the arm stops when none comes for 300 ms. */
+const SIGN_MS = 50;
+
+/**
+ * A button that is held with a pointer, or with the space bar or Enter while it has the focus.
+ * It lets go when it is released, when its page is hidden or loses the focus, and when a sign
+ * cannot be given. A sign is given only after the one before has arrived, so none is kept for later.
+ */
+class Hold {
+  constructor(button, give) {
+    Object.assign(this, { button, give, held: false, signs: 0 });
+    const press = (e) => { e.preventDefault(); this.press(); };
+    button.addEventListener("pointerdown", (e) => { button.setPointerCapture(e.pointerId); press(e); });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(end, () => this.release());
+    button.addEventListener("keydown", (e) => { if (e.key === " " || e.key === "Enter") press(e); });
+    button.addEventListener("keyup", () => this.release());
+    button.addEventListener("contextmenu", (e) => e.preventDefault());
+    addEventListener("blur", () => this.release());
+    document.addEventListener("visibilitychange", () => { if (document.hidden) this.release(); });
+  }
+
+  press() {
+    if (this.held) return;
+    this.held = true;
+    this.button.setAttribute("aria-pressed", "true");
+    this.go();
+  }
+
+  release() {
+    this.held = false;
+    this.button.setAttribute("aria-pressed", "false");
+  }
+
+  async go() {
+    while (this.held) {
+      const next = new Promise((done) => setTimeout(done, SIGN_MS));
+      if (!(await this.give())) return this.release();
+      this.signs++;
+      await next;
+    }
+  }
+}

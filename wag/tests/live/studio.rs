@@ -1,0 +1,230 @@
+//! The studio in a real browser, with a simulated rig: from a click on the map to the result.
+
+use super::chromium::Chromium;
+use super::client::Watch;
+use super::fake::Fake;
+use super::support::{Running, alone, until};
+use rustix::process::Signal;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// Longest time from the first click to the result.
+const RUN_WITHIN: Duration = Duration::from_secs(420);
+
+struct Studio {
+    process: Running,
+    url: String,
+}
+
+impl Studio {
+    fn start(runs: &Path, more: &str) -> Self {
+        let (process, reported) =
+            Running::start(&format!("studio --runs {} {more}", runs.display()));
+        let url = reported["url"].as_str().unwrap().to_owned();
+        Self { process, url }
+    }
+}
+
+/// A page of the studio that has been told what there is.
+fn open(page: &mut Chromium, url: &str) {
+    page.open(url);
+    page.until("the map", "studio.polls > 0 && map !== null");
+    page.until(
+        "the view",
+        "watched.drawn > 0 && beside.target_m !== undefined",
+    );
+}
+
+/// Clicks on the map where a target means (x, y) m; the numbers beside it.
+fn click_target(page: &mut Chromium, [x, y]: [f64; 2]) -> [f64; 2] {
+    page.middle_of("map");
+    let place = page.value(&format!(
+        "(() => {{ const r = byId('map').getBoundingClientRect(), [u, v] = onMap({x}, {y}, r.width, map.half_m);
+         return [r.x + u, r.y + v]; }})()"
+    ));
+    let place = [0, 1].map(|i| place[i].as_f64().unwrap());
+    page.click(place);
+    let set = page.value("target()");
+    [0, 1].map(|i| set[i].as_f64().unwrap())
+}
+
+/// Answers what the run asks and holds the control while the arm waits for it, as a person does,
+/// until it is over.
+fn operate(page: &mut Chromium) -> Vec<String> {
+    let began = Instant::now();
+    let (mut confirmed, mut held) = (Vec::new(), None);
+    loop {
+        assert!(began.elapsed() < RUN_WITHIN, "the run does not end");
+        let now = page.value(
+            "(() => { const w = studio.work;
+             return w && { over: w.is_over, word: w.question && w.question.word, holds: w.holds }; })()",
+        );
+        if now["over"] == true {
+            return confirmed;
+        }
+        let wants = now["holds"] == true;
+        if let Some(place) = held.filter(|_| !wants) {
+            page.mouse("mouseReleased", place);
+            held = None;
+        }
+        if let Some(word) = now["word"].as_str().filter(|_| !wants) {
+            let place = page.middle_of("confirm");
+            page.click(place);
+            confirmed.push(word.to_owned());
+            page.until(
+                "the answer",
+                "studio.work.is_over || studio.work.question === null",
+            );
+        } else if wants && held.is_none() {
+            let place = page.middle_of("hold");
+            page.mouse("mousePressed", place);
+            held = Some(place);
+        }
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+fn text(page: &mut Chromium, id: &str) -> String {
+    let text = page.value(&format!("byId('{id}').textContent"));
+    text.as_str().unwrap().to_owned()
+}
+
+/// Whether nothing sticks out to the right of a window of this width.
+fn fits(page: &mut Chromium, width: u32) -> bool {
+    let phone = json!({ "width": width, "height": 800, "deviceScaleFactor": 2, "mobile": true });
+    page.call("Emulation.setDeviceMetricsOverride", &phone);
+    let wide = page.value("document.documentElement.scrollWidth");
+    wide.as_f64().unwrap() <= f64::from(width)
+}
+
+#[test]
+fn from_a_click_on_the_map_to_the_result() {
+    let _alone = alone();
+    let Some(mut page) = Chromium::start() else {
+        return;
+    };
+    let runs = tempfile::tempdir().unwrap();
+    let mut studio = Studio::start(runs.path(), "--seed 31");
+    open(&mut page, &studio.url);
+    // Out of reach, said before anything begins; then within.
+    click_target(&mut page, [1.7, 0.0]);
+    page.until("the objection", "studio.objection !== null");
+    let set = click_target(&mut page, [0.95, 0.1]);
+    assert!((set[0] - 0.95).abs() < 0.02 && (set[1] - 0.1).abs() < 0.02);
+    page.until("no objection", "studio.objection === null");
+    let disabled = page.value("byId('run').disabled");
+    assert_eq!(disabled, true, "nobody said that the area is clear");
+    let clear = page.middle_of("clear");
+    page.click(clear);
+    let run = page.middle_of("run");
+    page.click(run);
+    page.until("the run", "studio.work !== null && !studio.work.is_over");
+    let confirmed = operate(&mut page);
+    let work = page.value("studio.work");
+    assert_eq!(work["is_ok"], true, "{work}");
+    assert_eq!(confirmed, ["WIGGLE", "MOVE", "THROW"]);
+    page.until("the result", "!byId('result').hidden && byId('report').src");
+    assert!(text(&mut page, "headline").starts_with("Done"));
+    assert!(
+        text(&mut page, "words").contains("nine of ten"),
+        "the plan in words"
+    );
+    let rows = page.value("byId('rope').rows.length");
+    assert_eq!(rows, 10, "nine parameters and a head");
+    page.until(
+        "the report in its frame",
+        "byId('runs').rows.length === 2 && byId('open').href.includes('report/')",
+    );
+    page.picture("studio-desktop.png");
+    // The same page on a phone.
+    assert!(fits(&mut page, 390), "it is wider than a phone");
+    page.picture("studio-phone.png");
+    assert_eq!(page.errors, Vec::<String>::new());
+    let own = |url: &String| url.starts_with(&studio.url) || url.starts_with("data:");
+    assert!(page.requests.iter().all(own), "{:?}", page.requests);
+    let (code, _) = studio.process.end(Signal::INT);
+    assert_eq!(code, Some(0));
+}
+
+/// A control that is let go of stops the arm, and so does a page that goes away.
+#[test]
+fn letting_go_stops_the_arm_and_the_run_says_so() {
+    let _alone = alone();
+    let Some(mut page) = Chromium::start() else {
+        return;
+    };
+    let runs = tempfile::tempdir().unwrap();
+    let studio = Studio::start(runs.path(), "--seed 32");
+    open(&mut page, &studio.url);
+    let begin = |page: &mut Chromium| {
+        let clear = page.middle_of("clear");
+        page.click(clear);
+        let wiggle = page.middle_of("wiggle");
+        page.click(wiggle);
+        page.until("the control", "studio.work !== null && studio.work.holds");
+        let hold = page.middle_of("hold");
+        page.mouse("mousePressed", hold);
+        page.until(
+            "the move",
+            "watched.last.controller !== null && watched.last.controller.mode === 'moving'",
+        );
+        hold
+    };
+    let hold = begin(&mut page);
+    page.mouse("mouseReleased", hold);
+    page.until("the end", "studio.work.is_over");
+    let work = page.value("studio.work");
+    assert_eq!(work["is_ok"], false, "{work}");
+    let stop = |work: &Value| {
+        let run = runs.path().join(work["run"].as_str().unwrap());
+        let cause = std::fs::read_to_string(run.join("cause.json")).unwrap();
+        let cause: Value = serde_json::from_str(&cause).unwrap();
+        cause["stops"][0]["code"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(stop(&work), "operator_stop");
+    begin(&mut page);
+    page.call("Page.navigate", &json!({ "url": "about:blank" }));
+    let ended = || {
+        let mut folders = std::fs::read_dir(runs.path()).unwrap().flatten();
+        folders
+            .all(|f| f.path().join("summary.json").is_file())
+            .then_some(())
+    };
+    until("the end", Duration::from_secs(30), ended);
+}
+
+/// Every click on the stop button reaches the controller.
+#[test]
+fn each_click_on_stop_arrives() {
+    let _alone = alone();
+    let Some(mut page) = Chromium::start() else {
+        return;
+    };
+    let long = std::env::var_os("WAG_LONG_TESTS").is_some();
+    let clicks = if long { 200 } else { 20 };
+    let fake = Fake::start(&format!("stops-{}", std::process::id()));
+    let watch = Watch::start(&format!("--domain {}", fake.domain));
+    page.open(&watch.url);
+    page.until("the button", "document.getElementById('stop') !== null");
+    let mut late_ms = Vec::new();
+    for click in 1..=clicks {
+        page.until(
+            "the last answer",
+            "!document.getElementById('stop').disabled",
+        );
+        let began = Instant::now();
+        page.value("document.getElementById('stop').click()");
+        until("the stop", Duration::from_secs(5), || {
+            (fake.wires.stops.load(Ordering::SeqCst) == click).then_some(())
+        });
+        late_ms.push(began.elapsed().as_secs_f64() * 1e3);
+    }
+    late_ms.sort_by(f64::total_cmp);
+    eprintln!(
+        "{clicks} stops arrived: median {:.0} ms, longest {:.0} ms",
+        late_ms[clicks / 2],
+        late_ms[clicks - 1]
+    );
+}
