@@ -142,17 +142,19 @@ impl Session {
                     at_ns: at.0,
                     at: SystemTime::now(),
                 });
-                tell(&Event::Confirmed {
+                let told = tell(&Event::Confirmed {
                     word: word.to_owned(),
                 });
-                eprintln!(
-                    "{}",
-                    match presence.switch() {
-                        Switch::DeadMan =>
-                            "Confirmed; Enter, or any other input, stops from now on",
-                        Switch::HoldToRun => "Confirmed",
-                    }
-                );
+                if !told {
+                    eprintln!(
+                        "{}",
+                        match presence.switch() {
+                            Switch::DeadMan =>
+                                "Confirmed; Enter, or any other input, stops from now on",
+                            Switch::HoldToRun => "Confirmed",
+                        }
+                    );
+                }
                 return Ok(at.0);
             }
             if presence.is_let_go() {

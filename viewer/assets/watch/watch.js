@@ -96,7 +96,8 @@ setInterval(showAge, 500);
 /** The arm and all that belongs to it in view, once; later only by the reset button. */
 function frameOnce(s) {
   if (!s.arm.length) return;
-  view.home = [...points(s.arm), ...points(s.rope), ...(s.target_m ? [s.target_m] : [])];
+  const target_m = s.target_m || beside.target_m;
+  view.home = [...points(s.arm), ...points(s.rope), ...(target_m ? [target_m] : [])];
   if (!framed) view.reset();
   framed = true;
 }
