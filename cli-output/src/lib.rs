@@ -24,6 +24,6 @@ pub use anyhow::anyhow;
 pub use failure::{Failure, OrInput, Outcome};
 pub use machine::Machine;
 pub use program::{
-    finish, interrupted, is_interrupted, refuse_usage, seed, start, watch_interrupts,
+    finish, interrupted, is_interrupted, refuse_usage, seed, start, watch_interrupts, watch_parent,
 };
 pub use progress::Stage;

@@ -6,6 +6,8 @@ use serde_json::{Value, json};
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::prelude::*;
 
@@ -103,4 +105,38 @@ pub fn is_interrupted() -> bool {
 /// The flag that Ctrl-C and SIGTERM set.
 pub fn interrupted() -> &'static AtomicBool {
     &INTERRUPTED
+}
+
+/// How often the parent is looked for.
+const PARENT_EVERY: Duration = Duration::from_millis(100);
+
+/// Sets the stop flag when the parent is gone, `outlives` later, and ends the process if it
+/// does not manage to end itself.
+///
+/// # Errors
+/// When the system refuses another thread.
+pub fn watch_parent(
+    parent: Option<u32>,
+    outlives: Duration,
+    end_within: Duration,
+) -> anyhow::Result<()> {
+    thread::Builder::new()
+        .name("parent-watch".to_owned())
+        .spawn(move || {
+            loop {
+                thread::sleep(PARENT_EVERY);
+                if parent.is_some_and(|p| std::os::unix::process::parent_id() != p) {
+                    tracing::warn!("the parent process is gone, ending");
+                    thread::sleep(outlives);
+                    INTERRUPTED.store(true, Ordering::SeqCst);
+                }
+                if INTERRUPTED.load(Ordering::SeqCst) {
+                    thread::sleep(end_within);
+                    tracing::warn!("not ended in time, exiting");
+                    std::process::exit(1);
+                }
+            }
+        })
+        .context("cannot start the parent watch")?;
+    Ok(())
 }

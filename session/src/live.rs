@@ -5,7 +5,7 @@ use super::presence::{Presence, Switch};
 use super::{ProcessSpec, Received, RunFile, Supervisor};
 use anyhow::{Context, bail};
 use cli_output::event::{Event, tell};
-use cli_output::is_interrupted;
+use cli_output::{is_interrupted, output};
 use shared_types::ipc::rpc::{Pending, Rpc, RpcClient};
 use shared_types::ipc::{Bus, DomainSweep, IpcError, OperatorEnd};
 use std::path::{Path, PathBuf};
@@ -90,6 +90,9 @@ impl Session {
     /// From now on the arm moves only as the operator at standard input lets it.
     pub fn watch_operator(&mut self, switch: Switch) -> anyhow::Result<()> {
         self.presence = Some(Presence::at_standard_input(switch)?);
+        if output::tells_events() {
+            return Ok(());
+        }
         eprintln!(
             "{}; Ctrl-C stops as well",
             match switch {
@@ -166,7 +169,10 @@ impl Session {
             std::thread::sleep(TURN);
         }
         eprint!("\n");
-        bail!("nobody typed {word} within 120 s; run the command again")
+        bail!(
+            "nobody typed {word} within {} s; run the command again",
+            within.as_secs()
+        )
     }
 
     /// Waits until the operator holds what must be held while the arm moves, if anything.
@@ -176,10 +182,12 @@ impl Session {
             Some(presence) => presence.lets_move() || presence.is_let_go(),
             None => true,
         };
+        let switch = self.presence.as_ref().map(Presence::switch);
+        let told = switch == Some(Switch::HoldToRun) && tell(&Event::Hold);
         if lets_move(self) {
             return Ok(());
         }
-        if !tell(&Event::Hold) {
+        if !told {
             eprintln!("Hold Enter down: the arm moves while it is held");
         }
         let began = Instant::now();
@@ -190,7 +198,10 @@ impl Session {
             }
             std::thread::sleep(TURN);
         }
-        bail!("nobody held Enter down within 120 s; nothing moved for it")
+        bail!(
+            "nobody held the control, Enter, within {} s; nothing moved for it",
+            CONFIRMED_WITHIN.as_secs()
+        )
     }
 
     /// Waits as [`await_hold`](Self::await_hold) does, for a motion that is planned next: until it
@@ -227,8 +238,10 @@ impl Session {
     /// One turn of everything that must go on while something else is waited
     /// for. Fails when a process died or the user pressed Ctrl-C.
     pub fn tick(&mut self) -> anyhow::Result<()> {
+        // Also before the operator's place is taken: what is typed must not be read later as new.
+        let let_go = self.presence.as_mut().is_some_and(Presence::is_let_go);
         if let Some(operator) = &mut self.operator {
-            if self.presence.as_mut().is_some_and(Presence::is_let_go) {
+            if let_go {
                 operator.let_go();
             } else if self.last_beat.elapsed() >= BEAT_EVERY {
                 operator.beat();

@@ -10,11 +10,15 @@ const SIGN_MS = 50;
  */
 class Hold {
   constructor(button, give) {
-    Object.assign(this, { button, give, held: false, signs: 0 });
+    Object.assign(this, { button, give, held: false, presses: 0, signs: 0, longest_ms: 0 });
     const press = (e) => { e.preventDefault(); this.press(); };
-    button.addEventListener("pointerdown", (e) => { button.setPointerCapture(e.pointerId); press(e); });
+    button.addEventListener("pointerdown", (e) => { if (e.button === 0) { button.setPointerCapture(e.pointerId); press(e); } });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(end, () => this.release());
-    button.addEventListener("keydown", (e) => { if (e.key === " " || e.key === "Enter") press(e); });
+    button.addEventListener("keydown", (e) => { if (e.key !== " " && e.key !== "Enter") return;
+      e.preventDefault();
+      // A key that was pressed for something else holds nothing.
+      if (!e.repeat) this.press();
+    });
     button.addEventListener("keyup", () => this.release());
     button.addEventListener("contextmenu", (e) => e.preventDefault());
     addEventListener("blur", () => this.release());
@@ -24,6 +28,7 @@ class Hold {
   press() {
     if (this.held) return;
     this.held = true;
+    this.presses++;
     this.button.setAttribute("aria-pressed", "true");
     this.go();
   }
@@ -34,11 +39,13 @@ class Hold {
   }
 
   async go() {
-    while (this.held) {
+    const press = this.presses;
+    for (let last = performance.now(); this.held && press === this.presses; last = performance.now()) {
       const next = new Promise((done) => setTimeout(done, SIGN_MS));
       if (!(await this.give())) return this.release();
       this.signs++;
       await next;
+      this.longest_ms = Math.max(this.longest_ms, performance.now() - last);
     }
   }
 }

@@ -5,7 +5,7 @@ const number = (id) => Number.parseFloat(byId(id).value);
 const target = () => ["x", "y", "z"].map(number);
 /** What a test may read. */
 const studio = { polls: 0, work: null, found: null, objection: null };
-let told = null, map = null, ended = "", asked = "", foundOf = "", ghost = null, pastRuns = [];
+let told = null, map = null, ended = "", asked = 0, foundOf = "", foundRun = "", ghost = null, pastRuns = [];
 
 async function get(path) {
   const answer = await fetch(path);
@@ -100,7 +100,6 @@ async function begin(from, run) {
   const [, words] = await post("begin?" + query({ from, run: run || "", clear, task, x, y, z,
     length_m: measured("length"), lead_mass_kg: measured("mass") }));
   byId("clear").checked = false;
-  byId("hold").focus({ preventScroll: true });
   say(words);
   poll(true);
 }
@@ -112,12 +111,15 @@ byId("plan").addEventListener("click", () => begin("plan", byId("earlier").value
 byId("again").addEventListener("click", () => begin("again", byId("again").dataset.run));
 byId("hang").addEventListener("click", async () => {
   say("the rope is changed");
-  const [, words] = await post("rig?" + query({ seed: byId("seed").value, task: byId("task").value }));
+  const [changed, words] = await post("rig?" + query({ seed: byId("seed").value, task: byId("task").value }));
+  // A correction is for the rope that missed.
+  if (changed) byId("again").hidden = true;
   say(words);
 });
 byId("confirm").addEventListener("click", async () => {
-  const word = byId("confirm").dataset.word;
-  const [done, words] = await post("confirm?" + query({ word }));
+  const { word, number } = byId("confirm").dataset;
+  byId("confirm").disabled = true;
+  const [done, words] = await post("confirm?" + query({ number }));
   say(done ? `${word} confirmed` : words);
   byId("hold").focus({ preventScroll: true });
 });
@@ -129,8 +131,10 @@ const hold = new Hold(byId("hold"), async () => {
   return done;
 });
 
-// While it is held, its signs go before pictures.
-pace_ms = () => (hold.held ? 250 : 0);
+/** Longer than this for a frame or between two signs (ms), and the signs could come too late. */
+const SLOW_MS = 80;
+// While it is held its signs go first: where drawing is slow, nothing is drawn.
+pace_ms = () => (!hold.held ? 0 : Math.max(frame_ms, hold.longest_ms) > SLOW_MS ? Infinity : 100);
 
 /** Buttons that begin something are there when it may begin. */
 function buttons() {
@@ -145,13 +149,21 @@ function buttons() {
 
 // What is told.
 
+let shownWork = "";
 function showWork(work) {
+  const all = JSON.stringify(work);
+  if (all === shownWork) return;
+  shownWork = all;
   byId("work").hidden = !work;
+  const appears = byId("hold").hidden && isBusy();
   byId("end").hidden = byId("hold").hidden = !isBusy();
+  if (appears) byId("hold").focus({ preventScroll: true });
   const question = work && work.question;
   byId("question").hidden = byId("confirming").hidden = !question;
-  const now = question ? question.word + question.text : "";
+  const now = question ? question.number : 0;
   if (now !== asked && question) {
+    byId("confirm").disabled = false;
+    byId("confirm").dataset.number = question.number;
     byId("question").textContent = question.text;
     byId("confirm").textContent = `Area clear: ${question.word}`;
     byId("confirm").dataset.word = question.word;
@@ -181,8 +193,16 @@ async function showResult(work) {
 
 /** What the run found so far, in words. */
 async function showFound(run) {
+  if (foundRun !== run) {
+    foundRun = run;
+    studio.found = null;
+    hide3d();
+  }
+  // A plan does not change.
+  if (studio.found && studio.found.plan) return;
   let found;
   try { found = await get("found?" + query({ run })); } catch { return; }
+  if (foundRun !== run) return;
   studio.found = found;
   byId("found").hidden = !found.rope.length && !found.plan;
   const text = (words, kind) => make("p", kind ? { class: kind } : {}, words);
@@ -270,10 +290,11 @@ async function look() {
 
 let looking = false;
 async function poll(now) {
-  if (looking) return;
-  looking = true;
-  try { await look(); } catch { byId("beginnote").textContent = "connection to the server lost"; }
-  looking = false;
+  if (!looking) {
+    looking = true;
+    try { await look(); } catch { byId("beginnote").textContent = "connection to the server lost"; }
+    looking = false;
+  }
   if (!now) setTimeout(poll, POLL_MS);
 }
 buttons();

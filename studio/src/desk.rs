@@ -29,6 +29,25 @@ pub(crate) struct Workplace {
 struct State {
     work: Option<Work>,
     rig: Option<Rig>,
+    /// Another rig is on its way.
+    is_changing: bool,
+    /// The studio is ending.
+    is_closed: bool,
+}
+
+impl State {
+    /// Why nothing may begin now.
+    fn objection(&self) -> Option<&'static str> {
+        if self.is_closed {
+            Some("the studio is ending")
+        } else if self.is_changing {
+            Some("the simulated rope is being changed")
+        } else if self.work.as_ref().is_some_and(|work| !work.is_over()) {
+            Some("a run is under way")
+        } else {
+            None
+        }
+    }
 }
 
 /// A refusal: its status and its words.
@@ -78,15 +97,23 @@ impl Workplace {
             Cell::Simulated { seed, task } => Some(Rig::start(seed, task, &settings.of_all())?),
             Cell::Real { .. } => None,
         };
-        let state = Mutex::new(State { work: None, rig });
+        let state = Mutex::new(State {
+            rig,
+            ..State::default()
+        });
         Ok(Self { settings, state })
     }
 
-    /// Where the camera films, if it is known.
-    pub(crate) fn domain(&self) -> Option<String> {
+    /// Where the run's controller is, or will be: where the camera films, if it does so in a domain, else
+    /// that of the run.
+    pub(crate) fn domain(&self) -> String {
         match &self.settings.cell {
-            Cell::Simulated { .. } => Some(rig::domain()),
-            Cell::Real { domain, .. } => domain.clone(),
+            Cell::Simulated { .. } => rig::domain(),
+            Cell::Real { domain, .. } => domain.clone().unwrap_or_else(|| {
+                let state = self.state();
+                let pid = state.work.as_ref().map(Work::process);
+                ledger::domain_of_process(pid.unwrap_or_else(std::process::id))
+            }),
         }
     }
 
@@ -101,9 +128,16 @@ impl Workplace {
         }
     }
 
-    /// Ends the run, as Ctrl-C would, and then the rig.
+    /// Ends the run, as Ctrl-C would, and then the rig; none begins after that.
     pub(crate) fn close(&self) {
-        *self.state() = State::default();
+        let ended = std::mem::replace(
+            &mut *self.state(),
+            State {
+                is_closed: true,
+                ..State::default()
+            },
+        );
+        drop(ended);
     }
 
     fn told(&self, is_local: bool) -> Told {
@@ -119,8 +153,8 @@ impl Workplace {
         let runs = &self.settings.runs;
         let job = Job::of(asked, runs).map_err(conflict)?;
         let mut state = self.state();
-        if state.work.as_ref().is_some_and(|work| !work.is_over()) {
-            return Err(conflict("a run is under way"));
+        if let Some(why) = state.objection() {
+            return Err(conflict(why));
         }
         let (reached_by, target_rgb) = match &self.settings.cell {
             Cell::Real {
@@ -150,18 +184,25 @@ impl Workplace {
         let seed = asked.value("seed").and_then(|seed| seed.parse().ok());
         let seed = seed.ok_or_else(|| conflict("a seed is a whole number"))?;
         let task = job::task(asked).map_err(conflict)?;
-        let mut state = self.state();
         if !matches!(self.settings.cell, Cell::Simulated { .. }) {
             return Err(conflict("this is no simulated rig"));
         }
-        if state.work.as_ref().is_some_and(|work| !work.is_over()) {
-            return Err(conflict("a run is under way"));
+        let mut state = self.state();
+        if let Some(why) = state.objection() {
+            return Err(conflict(why));
         }
-        // The one before has the domain.
-        state.rig = None;
-        let rig = Rig::start(seed, task, &self.settings.of_all())
-            .map_err(|error| conflict(format!("{error:#}")))?;
-        state.rig = Some(rig);
+        state.is_changing = true;
+        let before = state.rig.take();
+        drop(state);
+        // The one before has the domain; meanwhile the page goes on.
+        drop(before);
+        let rig = Rig::start(seed, task, &self.settings.of_all());
+        let mut state = self.state();
+        state.is_changing = false;
+        if state.is_closed {
+            return Err(conflict("the studio is ending"));
+        }
+        state.rig = Some(rig.map_err(|error| conflict(format!("{error:#}")))?);
         Ok("done".to_owned())
     }
 
@@ -171,9 +212,10 @@ impl Workplace {
         let work = state.work.as_mut().filter(|work| !work.is_over());
         let work = work.ok_or_else(|| conflict("nothing runs"))?;
         match asked.path {
-            "confirm" => work
-                .confirm(asked.value("word").unwrap_or_default())
-                .map_err(conflict)?,
+            "confirm" => {
+                let number = asked.value("number").and_then(|text| text.parse().ok());
+                work.confirm(number).map_err(conflict)?;
+            }
             "hold" => work.hold().map_err(conflict)?,
             _ => work.interrupt(),
         }
@@ -347,6 +389,6 @@ mod tests {
         for path in ["state", "picture", "ask/stop"] {
             assert_eq!(status("GET", path, true), None, "{path}");
         }
-        assert_eq!(place.domain().as_deref(), Some("lab"));
+        assert_eq!(place.domain(), "lab");
     }
 }

@@ -4,6 +4,7 @@ use anyhow::{Context, ensure};
 use run_log::ledger::{self, Entry};
 use run_log::{CellHere, files};
 use serde::Serialize;
+use shared_types::Task;
 use std::path::{Path, PathBuf};
 use viewer::report;
 
@@ -27,12 +28,22 @@ pub(crate) fn newest(runs: &Path) -> Vec<Past> {
     let inside = runs.read_dir().into_iter().flatten().flatten();
     let mut folders: Vec<PathBuf> = inside
         .map(|entry| entry.path())
+        .filter(|path| {
+            path.file_name()
+                .is_some_and(|name| is_plain(&name.to_string_lossy()))
+        })
         .filter(|path| ledger::is_run(path))
         .collect();
-    // Their names begin with the time.
+    // The names that commands give begin with the time.
     folders.sort();
     let newest = folders.iter().rev().take(RUNS_MAX);
     newest.filter_map(|folder| past(folder)).collect()
+}
+
+/// Whether a name needs no care in an address, and leads nowhere else.
+fn is_plain(name: &str) -> bool {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    name.chars().all(plain) && !name.starts_with('.')
 }
 
 fn past(folder: &Path) -> Option<Past> {
@@ -40,7 +51,10 @@ fn past(folder: &Path) -> Option<Past> {
     Some(Past {
         name: folder.file_name()?.to_str()?.to_owned(),
         has_rope: folder.join(files::ROPE).is_file(),
-        has_throw: entry.camera_m.is_some() && folder.join(files::PLAN).is_file(),
+        // Only strikes are corrected.
+        has_throw: entry.camera_m.is_some()
+            && entry.task.as_deref() == Some(Task::Strike.name())
+            && folder.join(files::PLAN).is_file(),
         entry,
     })
 }
@@ -50,21 +64,25 @@ fn past(folder: &Path) -> Option<Past> {
 /// # Errors
 /// There is no such run in `runs`.
 pub(crate) fn folder(runs: &Path, name: &str) -> anyhow::Result<PathBuf> {
-    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     let folder = runs.join(name);
-    let is_one = name.chars().all(plain) && !name.starts_with('.') && ledger::is_run(&folder);
-    ensure!(is_one, "there is no run `{name}`");
+    ensure!(
+        is_plain(name) && ledger::is_run(&folder),
+        "there is no run `{name}`"
+    );
     Ok(folder)
 }
 
-/// The report of a run; made if it is not there.
+/// The report of a run that has ended; made where there is none since its summary.
 ///
 /// # Errors
 /// There is no such run, or it has nothing to report.
 pub(crate) fn report(runs: &Path, name: &str, here: &CellHere) -> anyhow::Result<Vec<u8>> {
     let folder = folder(runs, name)?;
+    let written = |file: &str| folder.join(file).metadata().and_then(|m| m.modified()).ok();
+    let summary = written(files::SUMMARY);
+    ensure!(summary.is_some(), "the run `{name}` has not ended");
     let kept = folder.join("report.html");
-    let path = if kept.is_file() {
+    let path = if written("report.html") >= summary {
         kept
     } else {
         report::write(&folder, None, here)?.path

@@ -41,10 +41,7 @@ impl Studio {
     pub fn start(settings: Settings, bind: SocketAddr) -> anyhow::Result<(Self, String)> {
         let here = settings.here;
         let workplace = Arc::new(Workplace::open(settings)?);
-        let wanted = match workplace.domain() {
-            Some(domain) => Wanted::Domain(domain, None),
-            None => Wanted::Newest,
-        };
+        let wanted = Wanted::Domain(workplace.domain(), None);
         let desk = Arc::clone(&workplace);
         let (watcher, url) = Watcher::start(wanted, bind, here, Some(desk))?;
         Ok((Self { watcher, workplace }, url))
@@ -57,7 +54,9 @@ impl Studio {
     pub fn turn(&mut self) -> anyhow::Result<()> {
         self.watcher.turn()?;
         self.workplace.look();
-        Ok(())
+        // Its own run's controller, never another: the page's stop goes there.
+        let domain = self.workplace.domain();
+        self.watcher.follow(Wanted::Domain(domain, None))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The simulated rig of a studio without an arm: one rope hangs there until another is wanted.
 
 use crate::child;
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use serde_json::Value;
 use shared_types::Task;
 use std::io::{BufRead, BufReader, Read};
@@ -39,8 +39,9 @@ impl Rig {
         let camera = domain();
         let line = format!(
             "--json rig --rope random --camera {camera} --seed {seed} --task {} \
-             --command-port 0 --report-ports 0,0,0,0",
-            task.name()
+             --command-port 0 --report-ports 0,0,0,0 --parent {}",
+            task.name(),
+            std::process::id()
         );
         let mut words: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
         words.extend_from_slice(of_all);
@@ -77,6 +78,11 @@ impl Rig {
             .context("the simulated rig does not come up")?;
         let said: Value = serde_json::from_str(&text)
             .with_context(|| format!("the simulated rig does not come up: {text}"))?;
+        ensure!(
+            said["ok"] == true,
+            "the simulated rig does not come up: {}",
+            said["error"]
+        );
         let reported = &said["report_ports"];
         let (command, joints, status) = (&said["command_port"], &reported[0], &reported[2]);
         let reached_by = format!(

@@ -8,6 +8,7 @@ use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -16,6 +17,8 @@ use std::time::Duration;
 const LINES_MAX: usize = 60;
 /// Most bytes of the object that it prints at its end.
 const OBJECT_MAX: u64 = 1 << 24;
+/// Questions that were asked.
+static QUESTIONS: AtomicU64 = AtomicU64::new(1);
 /// How long it may take to stop the arm and to keep its record, once it was asked to end.
 const GRACE: Duration = Duration::from_secs(20);
 
@@ -31,6 +34,8 @@ struct StageLine {
 /// What it waits for before the arm moves.
 #[derive(Debug, Clone, Serialize)]
 struct Question {
+    /// No other question of this studio has it.
+    number: u64,
     word: String,
     text: String,
 }
@@ -67,7 +72,10 @@ impl Told {
                     (done.text, done.is_done) = (result, true);
                 }
             }
-            Some(Event::Ask { word, text }) => self.question = Some(Question { word, text }),
+            Some(Event::Ask { word, text }) => {
+                let number = QUESTIONS.fetch_add(1, Ordering::Relaxed);
+                self.question = Some(Question { number, word, text });
+            }
             Some(Event::Confirmed { .. }) => self.question = None,
             Some(Event::Hold) => self.holds = true,
             Some(Event::Release) => self.holds = false,
@@ -178,24 +186,35 @@ impl Work {
         }
     }
 
-    /// The word that it asks for, from the page that shows the question.
+    /// The question of this number is answered, once, with the word that it asks for.
     ///
     /// # Errors
-    /// It asks for no such word.
-    pub(crate) fn confirm(&mut self, word: &str) -> Result<(), &'static str> {
-        let question = locked(&self.told).question.clone();
-        if question.is_none_or(|question| question.word != word) {
-            return Err("nothing asks for that now");
-        }
-        self.write(&format!("{word}\n"))
+    /// It is not asked now.
+    pub(crate) fn confirm(&mut self, number: Option<u64>) -> Result<(), &'static str> {
+        let question = {
+            let mut told = locked(&self.told);
+            let asked = told.question.as_ref().map(|question| question.number);
+            told.question.take_if(|_| asked == number)
+        };
+        let question = question.ok_or("nothing asks for that now")?;
+        self.write(&format!("{}\n", question.word))
     }
 
-    /// The control is held.
+    /// The control is held. What comes while nothing waits for it, or moves, is not passed on.
     ///
     /// # Errors
     /// Nothing runs.
     pub(crate) fn hold(&mut self) -> Result<(), &'static str> {
-        self.write("\n")
+        if locked(&self.told).holds {
+            self.write("\n")
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Its process.
+    pub(crate) fn process(&self) -> u32 {
+        self.child.id()
     }
 
     fn write(&mut self, line: &str) -> Result<(), &'static str> {

@@ -7,7 +7,7 @@ const near = (a, b, by = 1e-9) => assert.ok(Math.abs(a - b) <= by, `${a} is not 
 const plain = (v) => JSON.parse(JSON.stringify(v));
 
 const space = "../../viewer/assets/report/space.js";
-const page = { addEventListener() {}, setInterval() {}, setTimeout, document: { addEventListener() {} } };
+const page = { addEventListener() {}, setInterval() {}, setTimeout, performance, document: { addEventListener() {} } };
 const { fromMap, onMap, onHeight, cameraMatrix, axes, Hold } = vm.runInNewContext(
   [space, "../assets/reach.js", "../assets/hold.js"].map(read).join("\n") +
   "\n({ fromMap, onMap, onHeight, cameraMatrix, axes, Hold })", page);
@@ -42,13 +42,16 @@ assert.strictEqual(onHeight(view, 350, 399, 5), null);
     open--;
     return works;
   });
-  heard.pointerdown({ pointerId: 1, preventDefault() {} });
+  heard.pointerdown({ pointerId: 1, button: 0, preventDefault() {} });
   await new Promise((done) => setTimeout(done, 400));
   assert.ok(hold.held && hold.signs >= 4 && most === 1, `${hold.signs} signs, ${most} at once`);
   heard.pointerup();
   const given = hold.signs;
   await new Promise((done) => setTimeout(done, 200));
   assert.ok(!hold.held && hold.signs <= given + 1, "it goes on after it was let go of");
+  // A key that repeats was pressed for something else.
+  heard.keydown({ key: "Enter", repeat: true, preventDefault() {} });
+  assert.ok(!hold.held);
   works = false;
   heard.keydown({ key: " ", preventDefault() {} });
   await new Promise((done) => setTimeout(done, 100));

@@ -24,6 +24,12 @@ pub fn new_name(what: &str) -> String {
     format!("{stamp}-{what}-{}", std::process::id())
 }
 
+/// The shared-memory domain of a run whose command is the process `pid`.
+#[must_use]
+pub fn domain_of_process(pid: u32) -> String {
+    format!("run-{pid}")
+}
+
 /// The runs in `places`: each is a run folder, or a folder of run folders. In order
 /// of their names, which begin with the time.
 pub fn find(places: &[PathBuf]) -> Result<Vec<Entry>> {

@@ -117,16 +117,24 @@ function draw(s) {
   watched.drawn++;
 }
 
-/** Least time between two drawings (ms), where a page that loads this has something more urgent. */
+/** Least time between two drawings (ms), where a page that loads this has something more urgent;
+ * Infinity for none. */
 let pace_ms = () => 0;
-/** Draws once for each frame of the screen, the newest state only. */
-let newest = null, drawn_ms = 0;
+/** Draws once for each frame of the screen, the newest state only; how long a frame takes (ms). */
+let newest = null, drawn_ms = 0, frame_ms = 0;
 function show(s) {
   if (s.jitter) jitter(s.jitter, s.missed);
   const tip = s.rope.slice(-3);
   tips = tip.length ? [...tips, tip].slice(-TIPS_MAX) : [];
   if (!newest && performance.now() - drawn_ms >= pace_ms()) {
-    requestAnimationFrame(() => { const s = newest; newest = null; drawn_ms = performance.now(); draw(s); });
+    const wanted_ms = performance.now();
+    requestAnimationFrame(() => {
+      const s = newest;
+      newest = null;
+      drawn_ms = performance.now();
+      draw(s);
+      frame_ms += 0.2 * (performance.now() - wanted_ms - frame_ms);
+    });
     newest = s;
   } else if (newest) newest = s;
   watched.states++;
@@ -152,7 +160,7 @@ async function pictures() {
   let seen = 0;
   for (;;) {
     const wait = (ms) => new Promise((done) => setTimeout(done, ms));
-    if (document.hidden || !(watched.last && watched.last.camera)) { await wait(300); continue; }
+    if (document.hidden || pace_ms() === Infinity || !(watched.last && watched.last.camera)) { await wait(300); continue; }
     try {
       const answer = await fetch("picture?after=" + seen);
       if (answer.status !== 200) { await wait(answer.status === 204 ? 0 : 1000); continue; }
@@ -169,7 +177,7 @@ async function pictures() {
       pictured = performance.now();
       showAge();
       watched.pictures++;
-      await wait(pace_ms());
+      if (pace_ms() < Infinity) await wait(pace_ms());
     } catch { await wait(1000); }
   }
 }

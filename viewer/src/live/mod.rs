@@ -204,6 +204,21 @@ impl Watcher {
         (self.snapshot(seen), true)
     }
 
+    /// Watches something else from now on.
+    ///
+    /// # Errors
+    /// Its domain cannot be joined.
+    pub fn follow(&mut self, wanted: Wanted) -> anyhow::Result<()> {
+        if self.wanted != wanted {
+            self.attached = match &wanted {
+                Wanted::Newest => None,
+                Wanted::Domain(domain, _) => Some(Attached::join(domain)?),
+            };
+            (self.wanted, self.seen) = (wanted, None);
+        }
+        Ok(())
+    }
+
     /// What a preview of the rope is to look at, through the calibration `named` or else that
     /// of the run; the page tells where there is none.
     pub fn preview_view(&mut self, named: Option<&Path>) -> Option<PreviewConfig> {

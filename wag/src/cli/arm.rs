@@ -199,6 +199,9 @@ pub struct RigArgs {
     /// Seed of the hidden rope and the noise.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     pub seed: u64,
+    /// Process without which it ends.
+    #[arg(long, hide = true)]
+    pub parent: Option<u32>,
 }
 
 #[derive(Debug, Args)]

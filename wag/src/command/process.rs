@@ -5,17 +5,14 @@
 
 use crate::cli::{ProcessArgs, ProcessName};
 use anyhow::Context;
-use cli_output::{OrInput, Outcome, interrupted, watch_interrupts};
+use cli_output::{OrInput, Outcome, interrupted, watch_interrupts, watch_parent};
 use rt_controller::ControllerConfig;
 use run_log::files;
 use serde::de::DeserializeOwned;
 use shared_types::ipc::DomainSweep;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 use viewer::report::simulated_rope;
 
-/// How often the parent is looked for.
-const PARENT_EVERY: Duration = Duration::from_millis(100);
 /// How long an orderly end may take before the process simply exits.
 const END_WITHIN: Duration = Duration::from_millis(1200);
 /// The same where an arm may have to be braked first.
@@ -27,34 +24,6 @@ const LOWEST: i32 = 19;
 
 /// How much longer than its parent a recorder lives: the controller then brakes.
 const OUTLIVES: Duration = Duration::from_secs(2);
-
-/// Sets the stop flag when the parent is gone, `outlives` later, and ends the process if it
-/// does not manage to end itself.
-fn watch_parent(
-    parent: Option<u32>,
-    outlives: Duration,
-    end_within: Duration,
-) -> anyhow::Result<()> {
-    std::thread::Builder::new()
-        .name("parent-watch".to_owned())
-        .spawn(move || {
-            loop {
-                std::thread::sleep(PARENT_EVERY);
-                if parent.is_some_and(|p| std::os::unix::process::parent_id() != p) {
-                    tracing::warn!("the parent process is gone, ending");
-                    std::thread::sleep(outlives);
-                    interrupted().store(true, Ordering::SeqCst);
-                }
-                if interrupted().load(Ordering::SeqCst) {
-                    std::thread::sleep(end_within);
-                    tracing::warn!("not ended in time, exiting");
-                    std::process::exit(1);
-                }
-            }
-        })
-        .context("cannot start the parent watch")?;
-    Ok(())
-}
 
 fn read<T: DeserializeOwned>(args: &ProcessArgs) -> Outcome<T> {
     let text = files::read_text(&args.config).or_input()?;

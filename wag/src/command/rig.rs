@@ -4,7 +4,7 @@ use crate::cli::RigArgs;
 use crate::config;
 use arm_model::Cell;
 use cli_output::{
-    Failure, OrInput, Outcome, interrupted, is_interrupted, output, watch_interrupts,
+    Failure, OrInput, Outcome, interrupted, is_interrupted, output, watch_interrupts, watch_parent,
 };
 use rig_sim::{RigConfig, run_announced};
 use run_log::files;
@@ -35,6 +35,7 @@ pub fn run(args: &RigArgs) -> Outcome<Option<Value>> {
     }
     let cell = config::cell().or_input()?;
     watch_interrupts().or_failed()?;
+    watch_parent(args.parent, Duration::ZERO, Duration::from_secs(2)).or_failed()?;
     match &args.rope {
         None => arm_alone(args, report_ports, faults, cell).map_err(Failure::of_server)?,
         Some(rope) => {

@@ -42,13 +42,17 @@ pub fn run(cli: &Cli, args: &StudioArgs) -> Outcome<Option<Value>> {
     std::fs::create_dir_all(&args.runs).or_input()?;
     watch_interrupts().or_failed()?;
     let (seed, task) = (args.seed, args.task);
-    let films = args.camera.camera.as_ref();
+    let camera = args
+        .camera
+        .camera
+        .iter()
+        .filter(|name| !name.starts_with('/'));
     let settings = Settings {
         cell: if is_real {
             Cell::Real {
                 reached_by: reached_by(args),
                 target_rgb: args.target_rgb.clone(),
-                domain: films.filter(|camera| !camera.starts_with('/')).cloned(),
+                domain: camera.chain(&args.controller).next().cloned(),
             }
         } else {
             Cell::Simulated { seed, task }

@@ -33,7 +33,7 @@ impl RunFolder {
         }
         let folder = Self {
             path,
-            domain: format!("run-{}", std::process::id()),
+            domain: ledger::domain_of_process(std::process::id()),
         };
         let command = CommandLine::of_this_program(SystemTime::now());
         files::write_json(&folder.file(files::COMMAND), &command).or_failed()?;

@@ -184,3 +184,37 @@ fn the_live_page_follows_a_run_and_stops_it() {
     let own = |url: &String| url.starts_with(&watch.url) || url.starts_with("data:");
     assert!(page.requests.iter().all(own), "{:?}", page.requests);
 }
+
+/// Every click on the stop button reaches the controller.
+#[test]
+fn each_click_on_stop_arrives() {
+    let _alone = alone();
+    let Some(mut page) = Chromium::start() else {
+        return;
+    };
+    let long = std::env::var_os("WAG_LONG_TESTS").is_some();
+    let clicks = if long { 200 } else { 20 };
+    let fake = Fake::start(&format!("stops-{}", std::process::id()));
+    let watch = Watch::start(&format!("--domain {}", fake.domain));
+    page.open(&watch.url);
+    page.until("the button", "document.getElementById('stop') !== null");
+    let mut late_ms = Vec::new();
+    for click in 1..=clicks {
+        page.until(
+            "the last answer",
+            "!document.getElementById('stop').disabled",
+        );
+        let began = Instant::now();
+        page.value("document.getElementById('stop').click()");
+        super::support::until("the stop", Duration::from_secs(5), || {
+            (fake.wires.stops.load(Ordering::SeqCst) == click).then_some(())
+        });
+        late_ms.push(began.elapsed().as_secs_f64() * 1e3);
+    }
+    late_ms.sort_by(f64::total_cmp);
+    eprintln!(
+        "{clicks} stops arrived: median {:.0} ms, longest {:.0} ms",
+        late_ms[clicks / 2],
+        late_ms[clicks - 1]
+    );
+}

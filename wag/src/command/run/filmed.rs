@@ -1,12 +1,12 @@
 //! The two motions of a run that are filmed, and what the film of the throw tells.
 
-use super::stages::{DECAYED_WITHIN_S, Run, UNNAMED_COLOURS, answered};
+use super::stages::{Run, UNNAMED_COLOURS, answered};
 use super::summary;
 use crate::command::motion;
 use crate::pipeline::{self, execute};
 use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::JointTrajectory;
-use cli_output::{Failure, Stage};
+use cli_output::Stage;
 use planner::arm_response::Following;
 use planner::plan::{Shortcoming, ThrowGoal, judge_seen, shortcoming};
 use rt_controller::os::now_ns;
@@ -91,21 +91,26 @@ impl Run<'_> {
         Ok(film)
     }
 
+    /// Refuses a motion that would break a limit, or moves joints that were not measured.
+    pub fn check_motion(
+        &self,
+        motion: &JointTrajectory,
+        mode: OperatingMode,
+    ) -> anyhow::Result<()> {
+        let (address, limits) = (&self.setup.address, &self.setup.limits);
+        let checked = motion::check(Some(address), limits, motion, mode);
+        let measured = || motion::require_measured_joints(address, motion, mode);
+        checked
+            .and_then(|()| measured())
+            .map_err(|why| anyhow!("{why}"))
+    }
+
     /// Refuses a throw that must not be sent, or that would not do what it is for: one planned for
     /// an arm that follows otherwise, or that is predicted to miss; on a simulated arm both are
     /// allowed.
     pub fn check_throw(&self, plan: &Plan) -> anyhow::Result<()> {
-        let (trajectory, address) = (&plan.trajectory, &self.setup.address);
-        let refused = |failure: Failure| anyhow!("{failure}");
-        motion::check(
-            Some(address),
-            &self.setup.limits,
-            trajectory,
-            OperatingMode::Throw,
-        )
-        .map_err(refused)?;
-        motion::require_measured_joints(address, trajectory, OperatingMode::Throw)
-            .map_err(refused)?;
+        self.check_motion(&plan.trajectory, OperatingMode::Throw)?;
+        let address = &self.setup.address;
         let follows = self.following.as_ref().map(Following::source);
         if plan.arm_response.as_deref() != follows && !address.simulated {
             let named = |source: Option<&str>| source.unwrap_or("none").to_owned();
@@ -157,9 +162,7 @@ impl Run<'_> {
         self.session
             .confirm_within(&told, "PLACED", PLACED_WITHIN)?;
         let stage = Stage::begin("place");
-        if !self.wait_still(&stage, DECAYED_WITHIN_S)? {
-            self.warn("the rope swings, and the throw is planned for one that hangs still");
-        }
+        self.wait_or_warn(&stage)?;
         stage.done("what the throw is for stands in its place");
         Ok(())
     }

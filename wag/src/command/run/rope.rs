@@ -7,12 +7,13 @@ use crate::command::network::warning_of_pole;
 use crate::command::plan::describe;
 use crate::command::unconfirmed::confirm;
 use crate::pipeline::{arm_for, execute};
-use anyhow::{Context, anyhow, bail, ensure};
+use anyhow::{Context, bail, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use cli_output::Stage;
 use planner::plan::{PlanOptions, PlanRequest, warnings};
 use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
 use planner::settle::SettleRequest;
+use rt_controller::control::arming::THROW_WITHIN_NS;
 use rt_controller::os::now_ns;
 use run_log::{Film, Settled, Tracked, files};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, RopeAppearance};
@@ -27,9 +28,15 @@ const JOINT_MARGIN_NS: u64 = 300_000_000;
 const PLANNING_S: f64 = 300.0;
 /// Keypoints per frame.
 const KEYPOINTS: u32 = 24;
-/// Time allowed for planning before the settling move begins (s); longer after a plan
-/// that came too late. The swing decays meanwhile: to wait spoils nothing.
-const SETTLING_S: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
+/// Time allowed for planning before the settling move begins, and the longest after plans that
+/// came too late, each twice as long (s). The swing decays meanwhile: to wait spoils nothing.
+const UNASKED_S: [f64; 2] = [2.0, 32.0];
+/// The same of a move that must begin soon after it was confirmed.
+const ASKED_S: [f64; 2] = [2.0, 8.0];
+/// Latest begin after it was confirmed (s), with half a second for the controller to hear of it.
+const CONFIRMED_S: f64 = THROW_WITHIN_NS as f64 * 1e-9 - 0.5;
+/// How much longer than where nobody is asked the rope is then watched for its stillness (s).
+const WATCHED_S: f64 = 12.0;
 /// What an operator confirms before it.
 const SETTLES: &str = "The arm will move to the throw's start and damp the rope's swing.";
 /// Time after which the answer about a settling move is not waited for any longer (s).
@@ -37,6 +44,15 @@ const SETTLED_S: f64 = 60.0;
 /// From the call to the first setpoint, on average (s): half a turn of the
 /// controller's bridge and half a cycle.
 const HANDOVER_S: f64 = 0.005;
+
+/// What came of an attempt to settle.
+enum Attempt {
+    Made(Settled),
+    /// The plan was not there in time.
+    Late,
+    /// The operator did not let it begin at its instant.
+    Unheld,
+}
 
 impl Run<'_> {
     /// Asks the planner; its last event, unless that is a failure.
@@ -227,28 +243,31 @@ impl Run<'_> {
         plan: &Plan,
     ) -> anyhow::Result<()> {
         let stage = Stage::begin("settle");
-        let lag_s = self.record.arm_lag_s;
-        let mut settled = None;
-        for planning_s in SETTLING_S {
-            let confirmed_ns = self.confirm_move(SETTLES)?;
+        let asks = self.setup.asks;
+        let [mut planning_s, longest_s] = if asks { ASKED_S } else { UNASKED_S };
+        let settled = loop {
+            let confirmed = asks.then(|| self.session.confirm(SETTLES, "MOVE"));
+            let confirmed = confirmed.transpose()?.map(MonotonicNs);
             self.session.await_control()?;
             let begin = MonotonicNs(now_ns()).plus_s(planning_s);
-            settled = self.settle_at(
-                (begin, lag_s, confirmed_ns),
-                (rope, film, wiggle, plan),
-                &stage,
-            )?;
+            let motions = (rope, film, wiggle, plan);
+            let made = self.settle_at((begin, confirmed), motions, &stage)?;
             self.session.end_hold();
-            if settled.is_some() {
-                break;
+            match made {
+                Attempt::Made(settled) => break settled,
+                Attempt::Unheld => self.warn(
+                    "MOVE came too long before the control was held, or it was not held when the move was to begin",
+                ),
+                Attempt::Late if planning_s < longest_s => planning_s *= 2.0,
+                Attempt::Late => bail!(
+                    "planning a swing-damping move takes too long on this machine; stop other programs"
+                ),
             }
+        };
+        let still = self.wait_still(&stage, SETTLED_WITHIN_S)?;
+        if asks && !still && !self.wait_still(&stage, WATCHED_S)? {
+            self.warn("the rope still moves a little after the damping move: see that it hangs still before THROW");
         }
-        let settled = settled.ok_or_else(|| {
-            anyhow!(
-                "planning a swing-damping move takes too long on this machine; stop other programs"
-            )
-        })?;
-        self.wait_still(&stage, SETTLED_WITHIN_S)?;
         self.record.settle = Some(settled);
         self.record.stages.settle_s = stage.done(&format!(
             "swing {:.1} cm -> {:.1} cm",
@@ -258,18 +277,20 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Plans a settling move for the instant `begin`, of an arm that follows late by `lag_s`,
-    /// and makes it; `None` when the plan came too late.
+    /// Plans a settling move for the instant `begin` and makes it, if it may begin then.
     fn settle_at(
         &mut self,
-        (begin, lag_s, confirmed_ns): (MonotonicNs, Option<f64>, u64),
+        (begin, confirmed): (MonotonicNs, Option<MonotonicNs>),
         (rope, film, wiggle, plan): (&RopeParams, &Film, &JointTrajectory, &Plan),
         stage: &Stage,
-    ) -> anyhow::Result<Option<Settled>> {
+    ) -> anyhow::Result<Attempt> {
+        if confirmed.is_some_and(|at| begin.since_s(at) > CONFIRMED_S) {
+            return Ok(Attempt::Unheld);
+        }
         self.session.received.drain()?;
         let cycles = &self.session.received.cycles;
         let joints = cycles.joints_between(film.first_stamp_ns, u64::MAX);
-        let start = begin.plus_s(lag_s.unwrap_or_default());
+        let start = begin.plus_s(self.record.arm_lag_s.unwrap_or_default());
         // The rope hangs still at the first joint sample.
         let epoch = joints.first().map_or(start, |(ns, _)| MonotonicNs(*ns));
         let (times_s, q) = joints
@@ -294,20 +315,22 @@ impl Run<'_> {
         };
         let swing_cm = 100.0 * found.plain_residual_m;
         stage.say(format!("damping {swing_cm:.1} cm of swing"));
+        let mode = OperatingMode::Wiggle;
+        self.check_motion(&found.trajectory, mode)?;
         let left_s = || begin.since_s(MonotonicNs(now_ns())) - HANDOVER_S;
         if left_s() < 0.0 {
-            return Ok(None);
+            return Ok(Attempt::Late);
         }
-        let mode = OperatingMode::Wiggle;
+        let confirmed_ns = confirmed.map_or_else(now_ns, |at| at.0);
         arm_for(self.session, &self.arm, mode, Some(confirmed_ns))?;
         let early = Duration::from_secs_f64((left_s() - 0.03).max(0.0));
         self.session.idle(early)?;
         std::thread::sleep(Duration::from_secs_f64(left_s().max(0.0)));
         if !self.session.is_held() {
-            return Ok(None);
+            return Ok(Attempt::Unheld);
         }
         let span = execute(self.session, &self.arm, &found.trajectory)?;
-        Ok(Some(Settled {
+        Ok(Attempt::Made(Settled {
             plain_residual_m: found.plain_residual_m,
             residual_m: found.residual_m,
             late_s: MonotonicNs(span.start_ns).since_s(begin),

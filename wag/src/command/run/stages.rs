@@ -29,7 +29,7 @@ const MOVE_SPEED: f64 = 0.04;
 /// Longest wait for the rope to hang still after a move that was planned to bring it to rest (s).
 pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 /// The same after any other move, where the swing of whatever was before decays by itself (s).
-pub(super) const DECAYED_WITHIN_S: f64 = 180.0;
+const DECAYED_WITHIN_S: f64 = 180.0;
 /// What to do where the colours to look for are not known.
 pub(super) const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
 /// How often the camera is asked for frames before the arm is enabled.
@@ -242,11 +242,12 @@ impl<'a> Run<'a> {
         pipeline::arm_for(self.session, &self.arm, operating_mode, Some(confirmed_ns))
     }
 
-    /// Lets the operator confirm a move that begins minutes after what was confirmed before;
-    /// when that was (CLOCK_MONOTONIC, ns), or now where nobody is asked.
-    pub(super) fn confirm_move(&mut self, what: &str) -> anyhow::Result<u64> {
-        let asked = self.setup.asks.then(|| self.session.confirm(what, "MOVE"));
-        Ok(asked.transpose()?.unwrap_or_else(now_ns))
+    /// Lets the operator confirm a move that begins minutes after what was confirmed before.
+    fn confirm_move(&mut self, what: &str) -> anyhow::Result<()> {
+        if self.setup.asks {
+            self.session.confirm(what, "MOVE")?;
+        }
+        Ok(())
     }
 
     /// Enables the arm, moves to the start pose, waits for the rope.
@@ -272,6 +273,11 @@ impl<'a> Run<'a> {
     /// Moves to the start of `motion` at set-up speed, and waits for the rope.
     fn move_to_start(&mut self, motion: &JointTrajectory, stage: &Stage) -> anyhow::Result<()> {
         set_up_move(self.session, &self.arm, motion.start(), MOVE_SPEED)?;
+        self.wait_or_warn(stage)
+    }
+
+    /// Waits until the rope hangs still, or its swing has had time to decay.
+    pub(super) fn wait_or_warn(&mut self, stage: &Stage) -> anyhow::Result<()> {
         if !self.wait_still(stage, DECAYED_WITHIN_S)? {
             self.warn(&format!(
                 "the rope still swings after {DECAYED_WITHIN_S} s, and what follows takes it to hang still"
