@@ -89,7 +89,7 @@ pub fn is_json() -> bool {
     state().json
 }
 
-/// From here on events are told, and stages by them alone.
+/// From here on events are told; with `--json` nothing else tells of stages.
 pub fn tell_events() {
     EVENTS.store(true, Ordering::Relaxed);
 }
@@ -118,7 +118,8 @@ pub fn aside(text: fmt::Arguments<'_>) {
     let _ = io::stderr().write_all(text.to_string().as_bytes());
 }
 
-/// Prints a line to standard error for people; with `--json` the object tells it.
+/// Prints a line to standard error for people; with `--json` the object tells it, unless events
+/// are told, whose reader shows it.
 pub fn remark(line: fmt::Arguments<'_>) {
     if !is_json() || tells_events() {
         aside(format_args!("{line}\n"));

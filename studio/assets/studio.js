@@ -121,6 +121,7 @@ byId("confirm").addEventListener("click", async () => {
   byId("confirm").disabled = true;
   const [done, words] = await post("confirm?" + query({ number }));
   say(done ? `${word} confirmed` : words);
+  poll(true);
   byId("hold").focus({ preventScroll: true });
 });
 byId("end").addEventListener("click", async () => say((await post("end"))[1] === "done" ? "the run is ending" : "nothing runs"));

@@ -150,7 +150,10 @@ impl Job {
 fn within(value: Option<f64>, key: &str, most: f64) -> anyhow::Result<Option<f64>> {
     let is_wrong = |v: &f64| *v <= 0.0 || *v > 2.0 * most;
     if let Some(wrong) = value.filter(is_wrong) {
-        bail!("`{key}` is {wrong}; ropes are up to {most} m long");
+        bail!(
+            "`{key}` is {wrong} m; it is above 0 and at most {} m",
+            2.0 * most
+        );
     }
     Ok(value)
 }
@@ -220,7 +223,7 @@ mod tests {
                 "from=wiggle&clear=yes&x=1&y=0&z=0&task=nod",
                 "no task `nod`",
             ),
-            ("from=wiggle&clear=yes&x=1&y=0&z=0&length_m=65", "up to"),
+            ("from=wiggle&clear=yes&x=1&y=0&z=0&length_m=65", "at most"),
             ("from=plan&clear=yes&x=1&y=0&z=0", "earlier run"),
             ("from=again&clear=yes&run=..", "no run"),
         ] {

@@ -64,7 +64,7 @@ impl Rig {
         });
         std::thread::spawn(move || {
             for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                tracing::warn!("rig: {line}");
+                tracing::info!("rig: {line}");
             }
         });
         let mut rig = Self {

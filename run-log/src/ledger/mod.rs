@@ -24,6 +24,15 @@ pub fn new_name(what: &str) -> String {
     format!("{stamp}-{what}-{}", std::process::id())
 }
 
+/// Makes the folder for runs, if it is not there.
+///
+/// # Errors
+/// It cannot be made.
+pub fn make_place(runs: &Path) -> Result<()> {
+    let cannot = || format!("cannot make the folder `{}` for runs", runs.display());
+    std::fs::create_dir_all(runs).with_context(cannot)
+}
+
 /// The shared-memory domain of a run whose command is the process `pid`.
 #[must_use]
 pub fn domain_of_process(pid: u32) -> String {

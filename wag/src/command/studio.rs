@@ -39,7 +39,7 @@ pub fn run(cli: &Cli, args: &StudioArgs) -> Outcome<Option<Value>> {
     if !is_real && args.camera.camera.is_some() {
         return Err(bad_input!("--camera films an arm: name it with --arm ADDR"));
     }
-    std::fs::create_dir_all(&args.runs).or_input()?;
+    run_log::ledger::make_place(&args.runs).or_input()?;
     watch_interrupts().or_failed()?;
     let (seed, task) = (args.seed, args.task);
     let camera = args

@@ -14,8 +14,8 @@ const COMMON: &str = "Cache-Control: no-store\r\n\
 const OF_PAGES: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
     connect-src 'self'; img-src data:; frame-src 'self'; frame-ancestors 'none'; \
     base-uri 'none'; form-action 'none'";
-/// What a document may do that a run folder holds: run what it contains, reach nobody, not even
-/// this server, and stand in a page of this server.
+/// What a document may do that a run folder holds: run what it contains, load nothing, ask this
+/// server for nothing (it has no origin), and stand in a page of this server.
 const OF_DOCUMENTS: &str = "default-src 'none'; script-src 'unsafe-inline'; \
     style-src 'unsafe-inline'; img-src data:; sandbox allow-scripts; frame-ancestors 'self'; \
     base-uri 'none'; form-action 'none'";
@@ -44,7 +44,7 @@ impl Reply {
         }
     }
 
-    /// A report of a run: its scripts run, and reach nobody.
+    /// A report of a run: its scripts run, and load nothing.
     pub fn document(html: impl Into<Vec<u8>>) -> Self {
         Self {
             policy: OF_DOCUMENTS,

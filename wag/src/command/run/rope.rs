@@ -35,8 +35,8 @@ const UNASKED_S: [f64; 2] = [2.0, 32.0];
 const ASKED_S: [f64; 2] = [2.0, 8.0];
 /// Latest begin after it was confirmed (s), with half a second for the controller to hear of it.
 const CONFIRMED_S: f64 = THROW_WITHIN_NS as f64 * 1e-9 - 0.5;
-/// How much longer than where nobody is asked the rope is then watched for its stillness (s).
-const WATCHED_S: f64 = 12.0;
+/// How long the rope is watched for its stillness where somebody waits (s).
+const WATCHED_S: f64 = 15.0;
 /// What an operator confirms before it.
 const SETTLES: &str = "The arm will move to the throw's start and damp the rope's swing.";
 /// Time after which the answer about a settling move is not waited for any longer (s).
@@ -44,6 +44,9 @@ const SETTLED_S: f64 = 60.0;
 /// From the call to the first setpoint, on average (s): half a turn of the
 /// controller's bridge and half a cycle.
 const HANDOVER_S: f64 = 0.005;
+
+/// The rope, and the film and the motion after which it swings; the plan of its throw.
+type Motions<'a> = (&'a RopeParams, &'a Film, &'a JointTrajectory, &'a Plan);
 
 /// What came of an attempt to settle.
 enum Attempt {
@@ -235,13 +238,7 @@ impl Run<'_> {
     /// Turns towards the target so that the rope comes to rest: by a move planned with the
     /// identified rope and begun at the instant it was planned for. It is planned once the
     /// operator has confirmed it, and holds the control where there is one.
-    pub fn settle(
-        &mut self,
-        rope: &RopeParams,
-        film: &Film,
-        wiggle: &JointTrajectory,
-        plan: &Plan,
-    ) -> anyhow::Result<()> {
+    pub fn settle(&mut self, motions: Motions<'_>) -> anyhow::Result<()> {
         let stage = Stage::begin("settle");
         let asks = self.setup.asks;
         let [mut planning_s, longest_s] = if asks { ASKED_S } else { UNASKED_S };
@@ -250,23 +247,20 @@ impl Run<'_> {
             let confirmed = confirmed.transpose()?.map(MonotonicNs);
             self.session.await_control()?;
             let begin = MonotonicNs(now_ns()).plus_s(planning_s);
-            let motions = (rope, film, wiggle, plan);
             let made = self.settle_at((begin, confirmed), motions, &stage)?;
             self.session.end_hold();
             match made {
                 Attempt::Made(settled) => break settled,
-                Attempt::Unheld => self.warn(
-                    "MOVE came too long before the control was held, or it was not held when the move was to begin",
-                ),
+                Attempt::Unheld => self.warn("the control was not held soon after MOVE, or let go"),
                 Attempt::Late if planning_s < longest_s => planning_s *= 2.0,
-                Attempt::Late => bail!(
-                    "planning a swing-damping move takes too long on this machine; stop other programs"
-                ),
+                Attempt::Late => {
+                    bail!("planning takes too long on this machine; stop other programs")
+                }
             }
         };
-        let still = self.wait_still(&stage, SETTLED_WITHIN_S)?;
-        if asks && !still && !self.wait_still(&stage, WATCHED_S)? {
-            self.warn("the rope still moves a little after the damping move: see that it hangs still before THROW");
+        let within_s = if asks { WATCHED_S } else { SETTLED_WITHIN_S };
+        if !self.wait_still(&stage, within_s)? && asks {
+            self.warn("the rope still moves a little: see that it hangs still before THROW");
         }
         self.record.settle = Some(settled);
         self.record.stages.settle_s = stage.done(&format!(
@@ -281,7 +275,7 @@ impl Run<'_> {
     fn settle_at(
         &mut self,
         (begin, confirmed): (MonotonicNs, Option<MonotonicNs>),
-        (rope, film, wiggle, plan): (&RopeParams, &Film, &JointTrajectory, &Plan),
+        (rope, film, wiggle, plan): Motions<'_>,
         stage: &Stage,
     ) -> anyhow::Result<Attempt> {
         if confirmed.is_some_and(|at| begin.since_s(at) > CONFIRMED_S) {

@@ -175,7 +175,7 @@ impl<'a> Run<'a> {
                 let (motion, film, appearance) = self.tracked()?;
                 let rope = self.identify(&film, appearance)?;
                 let plan = self.plan(&rope)?;
-                self.settle(&rope.params, &film, &motion, &plan)?;
+                self.settle((&rope.params, &film, &motion, &plan))?;
                 plan
             }
         };
