@@ -69,8 +69,25 @@ impl State {
         write_whole(path, &sealed(out))
     }
 
-    /// Reads a checkpoint.
+    /// Reads a checkpoint to go on from it. The moments go to the tensor library's default
+    /// device until the next step: a card if it was built for one.
     pub(crate) fn load(path: &Path, device: &Device) -> Result<Self> {
+        let (mut state, moments) = Self::without_moments(path, device)?;
+        let record = OptimizerRecord::from_bytes(Bytes::from_bytes_vec(moments))
+            .map_err(TrainingError::tensors)?;
+        state.optimizer = state.optimizer.load_record(record);
+        Ok(state)
+    }
+
+    /// Reads a checkpoint to judge or to write its network, on this processor and without
+    /// a card even if built for one. Adam is new.
+    pub(crate) fn load_weights(path: &Path) -> Result<Self> {
+        let (state, _) = Self::without_moments(path, &Device::flex().autodiff())?;
+        Ok(state)
+    }
+
+    /// Reads a checkpoint; what is in it of Adam as it stands there.
+    fn without_moments(path: &Path, device: &Device) -> Result<(Self, Vec<u8>)> {
         let bytes = read(path)?;
         let damaged = || {
             let reason = "not a checkpoint, or damaged: remove it to start over";
@@ -85,7 +102,7 @@ impl State {
             rest = after;
             Some(part.to_vec())
         };
-        let (Some(json), Some(model), Some(optimizer)) = (part(), part(), part()) else {
+        let (Some(json), Some(model), Some(moments)) = (part(), part(), part()) else {
             return Err(damaged());
         };
         let progress: Progress = serde_json::from_slice(&json).map_err(|error| {
@@ -98,12 +115,11 @@ impl State {
         let model = PhiModel::new(network, &progress.config.features(), device)
             .try_load_record(record)
             .map_err(TrainingError::tensors)?;
-        let record = OptimizerRecord::from_bytes(Bytes::from_bytes_vec(optimizer))
-            .map_err(TrainingError::tensors)?;
-        Ok(Self {
+        let state = Self {
             progress,
             model,
-            optimizer: adam().load_record(record),
-        })
+            optimizer: adam(),
+        };
+        Ok((state, moments))
     }
 }

@@ -135,7 +135,7 @@ pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
         };
         (0..count).map(in_units).collect::<Result<_>>()?
     } else {
-        let state = State::load(&path_in(&arguments.run), &Device::flex().autodiff())?;
+        let state = State::load_weights(&path_in(&arguments.run))?;
         let looked = look(&state, &studio, count)?;
         let scales = ParameterScale::of_ranges();
         let in_units = |p: &Predicted| in_units(&scales, &p.mean, &p.log_variance);
@@ -161,7 +161,7 @@ pub(crate) fn evaluate(arguments: &EvaluateArguments) -> Result<()> {
 }
 
 pub(crate) fn export(arguments: &ExportArguments) -> Result<()> {
-    let state = State::load(&path_in(&arguments.run), &Device::flex().autodiff())?;
+    let state = State::load_weights(&path_in(&arguments.run))?;
     let config = &state.progress.config;
     let training = ropes(config, &arguments.data, Share::Training)?;
     let held_out = ropes(config, &arguments.data, Share::HeldOut)?;

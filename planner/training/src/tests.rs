@@ -120,6 +120,8 @@ fn a_training_learns_resumes_bit_for_bit_and_is_written_as_it_is() {
     assert!(whole_folder.join("loss.svg").exists());
     let again = State::load(&path_in(&whole_folder), &Device::flex().autodiff());
     assert!(weights(&again.unwrap()) == weights(&whole));
+    let again = State::load_weights(&path_in(&whole_folder));
+    assert!(weights(&again.unwrap()) == weights(&whole));
 
     // Another configuration does not go on from this checkpoint.
     let mut other = config.clone();
