@@ -13,7 +13,8 @@ use iceoryx2::service::port_factory::request_response::PortFactory;
 
 /// Events a caller may leave unread before the server has to wait.
 const EVENT_BUFFER: usize = 256;
-const MAX_CLIENTS: usize = 8;
+/// Of one service; each page that is watched keeps one of the controller's.
+const MAX_CLIENTS: usize = 16;
 
 type BytesService = PortFactory<Transport, [u8], (), [u8], ()>;
 

@@ -38,7 +38,7 @@ async function ask(name, button) {
   button.disabled = true;
   byId("answer").textContent = `${WORDS[name]}: requested`;
   try {
-    const answer = await fetch("ask/" + name, { method: "POST" });
+    const answer = await fetch("ask/" + name, { method: "POST", priority: "high" });
     byId("answer").textContent = `${WORDS[name]}: ${await answer.text()}`;
   } catch {
     byId("answer").textContent = `${WORDS[name]}: connection to the server lost; use the emergency stop`;
@@ -55,7 +55,9 @@ function asks(list) {
   byId("asks").replaceChildren(...able.map(([name, objection]) => {
     const button = make("button", { type: "button", id: name }, WORDS[name]);
     button.disabled = Boolean(objection);
-    button.addEventListener("click", () => ask(name, button));
+    // A stop does not wait until the pointer is released; keys click without one (detail 0).
+    if (name === "stop") button.addEventListener("pointerdown", () => ask(name, button));
+    button.addEventListener("click", (e) => { if (name !== "stop" || e.detail === 0) ask(name, button); });
     return button;
   }));
   byId("asknote").textContent = list.filter(([, objection]) => objection)

@@ -3,7 +3,6 @@
 use super::attached::Seen;
 use anyhow::Context;
 use serde::Serialize;
-use shared_types::ipc::Bus;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest, ControllerRpc};
 use shared_types::ipc::rpc::{Pending, RpcClient};
 use std::sync::mpsc;
@@ -73,8 +72,6 @@ pub(crate) type Answer = Result<(), String>;
 #[derive(Debug)]
 pub(crate) struct Open {
     pending: Pending<ControllerRpc>,
-    // Its answers come through it.
-    _client: RpcClient<ControllerRpc>,
     since: Instant,
     reply: mpsc::Sender<Answer>,
 }
@@ -83,20 +80,21 @@ pub(crate) struct Open {
 /// answered at once.
 pub(crate) fn hand_over(
     requested: Requested,
-    bus: Option<&Bus>,
+    controller: Option<&RpcClient<ControllerRpc>>,
     now: Option<&Seen>,
 ) -> Option<Open> {
-    let sent = match (requested.ask.objection(now), bus) {
+    let sent = match (requested.ask.objection(now), controller) {
         (Some(objection), _) => Err(anyhow::anyhow!(objection)),
-        (None, None) => Err(anyhow::anyhow!("no controller runs")),
-        (None, Some(bus)) => RpcClient::<ControllerRpc>::open(bus)
-            .and_then(|client| Ok((client.call(&requested.ask.request())?, client)))
+        (None, None) => Err(anyhow::anyhow!(
+            "the controller cannot be reached; use the emergency stop"
+        )),
+        (None, Some(controller)) => controller
+            .call(&requested.ask.request())
             .context("the controller cannot be reached; use the emergency stop"),
     };
     match sent {
-        Ok((pending, client)) => Some(Open {
+        Ok(pending) => Some(Open {
             pending,
-            _client: client,
             since: Instant::now(),
             reply: requested.reply,
         }),

@@ -3,6 +3,8 @@
 
 use super::facts::{Facts, folder_of_process};
 use super::film::Film;
+use shared_types::ipc::message::ControllerRpc;
+use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{
     Bus, ControllerState, CycleSubscriber, DomainSweep, IpcError, JointSubscriber, OperatorReader,
     StateReader, running_controllers,
@@ -48,6 +50,9 @@ pub(crate) struct Controller {
     opened: Instant,
     /// Its run folder, if it has one, and what lies there.
     pub facts: Facts,
+    /// Where a page's requests go: open already, because to open it takes some tenths of a
+    /// second, which a stop must not wait for.
+    pub requests: Option<RpcClient<ControllerRpc>>,
 }
 
 /// What a controller shows at one moment.
@@ -77,6 +82,7 @@ impl Controller {
             operator,
             opened: Instant::now(),
             facts: Facts::of(folder),
+            requests: None,
         })
     }
 
@@ -101,7 +107,7 @@ pub(crate) struct Attached {
     /// Joints as measured.
     pub joints: Option<JointSubscriber>,
     pub film: Option<Film>,
-    pub bus: Bus,
+    bus: Bus,
     _sweep: DomainSweep,
     pub domain: String,
 }
@@ -134,7 +140,11 @@ impl Attached {
         if self.controller.is_none() && search {
             self.controller = Controller::open(&self.bus, run).ok();
         }
-        let seen = self.controller.as_mut()?.look();
+        let controller = self.controller.as_mut()?;
+        if controller.requests.is_none() && search {
+            controller.requests = RpcClient::open(&self.bus).ok();
+        }
+        let seen = controller.look();
         let gone = !seen.alive && !Path::new(&format!("/proc/{}", seen.state.pid)).exists();
         if gone {
             self.controller = None;

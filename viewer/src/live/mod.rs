@@ -166,9 +166,11 @@ impl Watcher {
 
     fn pass_on(&mut self, requested: Requested) {
         tracing::info!(ask = requested.ask.name(), "requested by a page");
-        let bus = self.attached.as_ref().map(|attached| &attached.bus);
+        let attached = self.attached.as_ref();
+        let controller = attached.and_then(|attached| attached.controller.as_ref());
+        let requests = controller.and_then(|controller| controller.requests.as_ref());
         self.open
-            .extend(hand_over(requested, bus, self.seen.as_ref()));
+            .extend(hand_over(requested, requests, self.seen.as_ref()));
     }
 
     /// Looks at everything once; whether nothing has to be joined anew.
