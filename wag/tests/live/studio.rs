@@ -67,8 +67,7 @@ fn operate(page: &mut Chromium) -> Vec<String> {
             held = None;
         }
         if let Some(word) = now["word"].as_str().filter(|_| !wants) {
-            let place = page.middle_of("confirm");
-            page.click(place);
+            press(page, "confirm");
             confirmed.push(word.to_owned());
             page.until(
                 "the answer",
@@ -83,6 +82,11 @@ fn operate(page: &mut Chromium) -> Vec<String> {
     }
 }
 
+fn press(page: &mut Chromium, id: &str) {
+    let place = page.middle_of(id);
+    page.click(place);
+}
+
 /// How long frames and heartbeats took on this machine.
 fn busy(page: &mut Chromium) -> String {
     let told =
@@ -92,10 +96,8 @@ fn busy(page: &mut Chromium) -> String {
 
 /// One run from its wiggle to its end; what was confirmed.
 fn throw(page: &mut Chromium) -> Vec<String> {
-    let clear = page.middle_of("clear");
-    page.click(clear);
-    let run = page.middle_of("run");
-    page.click(run);
+    press(page, "clear");
+    press(page, "run");
     page.until("the run", "studio.work !== null && !studio.work.is_over");
     operate(page)
 }
@@ -180,10 +182,8 @@ fn letting_go_stops_the_arm_and_the_run_says_so() {
     let studio = Studio::start(runs.path(), "--seed 32");
     open(&mut page, &studio.url);
     let begin = |page: &mut Chromium| {
-        let clear = page.middle_of("clear");
-        page.click(clear);
-        let wiggle = page.middle_of("wiggle");
-        page.click(wiggle);
+        press(page, "clear");
+        press(page, "wiggle");
         page.until("the control", "studio.work !== null && studio.work.holds");
         let hold = page.middle_of("hold");
         page.mouse("mousePressed", hold);
