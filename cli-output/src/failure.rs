@@ -89,11 +89,17 @@ fn suggestion(refusal: &str) -> Option<String> {
     let named = refusal.split_once("unknown field ")?.1;
     let mut names = named.split('`').skip(1).step_by(2);
     let unknown = names.next()?;
-    names
+    nearest(unknown, names).map(|known| format!("did you mean `{known}`?"))
+}
+
+/// The known name that `unknown` is probably a slip of.
+pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let known = known.into_iter();
+    known
         .map(|known| (strsim::damerau_levenshtein(unknown, known), known))
         .filter(|(edits, known)| *edits <= SLIP && *edits < known.len())
         .min()
-        .map(|(_, known)| format!("did you mean `{known}`?"))
+        .map(|(_, known)| known)
 }
 
 /// Errors that are the caller's input by default.

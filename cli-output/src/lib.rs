@@ -21,7 +21,7 @@ pub mod table;
 
 #[doc(hidden)]
 pub use anyhow::anyhow;
-pub use failure::{Failure, OrInput, Outcome};
+pub use failure::{Failure, OrInput, Outcome, nearest};
 pub use machine::Machine;
 pub use program::{
     finish, interrupted, is_interrupted, refuse_usage, seed, start, watch_interrupts, watch_parent,

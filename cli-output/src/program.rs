@@ -67,11 +67,19 @@ pub fn refuse_usage(error: &clap::Error) -> ExitCode {
 /// error; `WAG_LOG` sets the filter (`debug`, `planner=trace`).
 pub fn start(json: bool, verbose: u8) {
     output::set_json(json);
-    let default = match verbose {
-        0 => "warn,iceoryx2=error,tract_onnx=error",
-        1 => "info,iceoryx2=error,tract_onnx=error",
+    let own = match verbose {
+        0 => "warn",
+        1 => "info",
         _ => "debug",
     };
+    // What others say of their own insides helps nobody but who looks for everything.
+    let others = match verbose {
+        0 | 1 => {
+            ",iceoryx2=error,tract_onnx=error,calib_targets_charuco=error,calib_targets_chessboard=error"
+        }
+        _ => "",
+    };
+    let default = format!("{own}{others}");
     let filter: Targets = std::env::var("WAG_LOG")
         .ok()
         .and_then(|text| text.parse().ok())

@@ -85,12 +85,21 @@ impl Stage {
 
     /// Ends the stage with its result; returns its duration (s).
     pub fn done(&self, result: &str) -> f64 {
+        self.end('✔', result)
+    }
+
+    /// Ends a stage without what it was for, while the command goes on; returns its duration (s).
+    pub fn failed(&self, why: &str) -> f64 {
+        self.end('✘', why)
+    }
+
+    fn end(&self, mark: char, result: &str) -> f64 {
         let seconds = self.began.elapsed().as_secs_f64();
         tell(&Event::Done {
             stage: self.name.to_owned(),
             result: result.to_owned(),
         });
-        let line = format!("✔ {:<12} {result} ({seconds:.1} s)", self.name);
+        let line = format!("{mark} {:<12} {result} ({seconds:.1} s)", self.name);
         if self.plain {
             eprintln!("{line}");
         }

@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::figures::FiguresCommand;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_output::seed;
 use planner::identify::Method;
@@ -36,6 +37,9 @@ pub enum Command {
     Rooms(RoomsArgs),
     /// Count the wiggles in drawn rooms that the tracker follows, refuses and gets wrong.
     TrackRooms(TrackRoomsArgs),
+    /// Figures of README and book: make them, write them into the documents, check these.
+    #[command(subcommand)]
+    Figures(FiguresCommand),
     /// A result of the paper.
     #[command(flatten)]
     Result(ResultCommand),
@@ -194,7 +198,7 @@ pub struct ResultArgs {
     /// each wiggle, for lob-drape its own 24, for robust 200,
     /// for parameter-importance 30, for sensitivity-maps 8, for other-reality 20 with each
     /// channel, for full-pipeline 30 (motion-fidelity has its own).
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     pub ropes: Option<u64>,
     /// Seed of the ropes, the films and the searches.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]

@@ -13,6 +13,7 @@ extern crate cli_output;
 
 mod args;
 mod bench;
+mod figures;
 mod network;
 mod program;
 mod report;
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
     cli_output::start(cli.json, cli.verbose);
     let outcome = match &cli.command {
         args::Command::Bench(bench) => bench::run(bench),
+        args::Command::Figures(command) => figures::run(command),
         args::Command::Rooms(args) => rooms::run(args),
         args::Command::TrackRooms(args) => rooms::track::run(args),
         args::Command::Result(result) => results::run(result),

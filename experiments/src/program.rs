@@ -4,6 +4,7 @@
 use anyhow::Context;
 use planner::phi::hex;
 use sha2::{Digest, Sha256};
+use std::path::Path;
 use std::sync::OnceLock;
 
 /// Digits of the hash that are kept.
@@ -16,10 +17,17 @@ pub(crate) fn program() -> anyhow::Result<String> {
         Some(hash) => hash,
         None => {
             // The file that runs, even if another has taken its place since.
-            let file = std::fs::read("/proc/self/exe").context("this program's own file")?;
-            let hash = hex(Sha256::digest(file).as_slice());
-            HASH.get_or_init(|| hash[..DIGITS].to_owned())
+            let hash = program_at(Path::new("/proc/self/exe"))?;
+            HASH.get_or_init(|| hash)
         }
     };
-    Ok(format!("{}-{hash}", shared_types::VERSION))
+    Ok(hash.clone())
+}
+
+/// The same of a program in a file.
+pub(crate) fn program_at(path: &Path) -> anyhow::Result<String> {
+    let fail = || format!("the program `{}`", path.display());
+    let file = std::fs::read(path).with_context(fail)?;
+    let hash = hex(Sha256::digest(file).as_slice());
+    Ok(format!("{}-{}", shared_types::VERSION, &hash[..DIGITS]))
 }

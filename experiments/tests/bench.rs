@@ -4,8 +4,7 @@
 mod support;
 
 use serde_json::Value;
-use std::path::Path;
-use support::report;
+use support::{missing, report};
 
 /// The number at `path`, which must be there, finite and above zero.
 fn positive(value: &Value, path: &str) -> f64 {
@@ -60,12 +59,10 @@ fn bench_rope_prints_one_whole_json_object() {
 
 #[test]
 fn bench_track_reports_times_and_memory_of_a_recording() {
-    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/wiggle/a1");
-    if !Path::new(data).exists() {
-        println!("skipped: {data} not found");
+    let Some(data) = missing::shared("data/wiggle/a1") else {
         return;
-    }
-    let report = report(&format!("bench track --quick --video {data}"));
+    };
+    let report = report(&format!("bench track --quick --video {}", data.display()));
     assert_eq!(report["command"], "bench track");
     assert_eq!(report["limit_mb"], 400.0);
     let together = positive(&report, "/together_cpu_ms");

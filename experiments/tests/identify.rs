@@ -2,6 +2,9 @@
 //! keypoints were made by another simulator (MuJoCo).
 #![cfg(test)]
 
+#[path = "../../hil-tests/support/missing.rs"]
+mod missing;
+
 use arm_model::{JointTrajectory, Pole};
 use experiments::trials::{TrialRig, mean, summarise};
 use planner::identify;
@@ -279,14 +282,10 @@ fn true_keypoints_of(folder: &Path) -> KeypointTrack {
 /// little and `link_extra_scale` means nothing there.
 #[test]
 fn the_recorded_rope_is_identified_from_its_true_keypoints() {
-    let folder = Path::new(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../shared/data/wiggle/a1"
-    ));
-    if !folder.exists() {
-        println!("skipped: recording a1 not found");
+    let Some(folder) = missing::shared("data/wiggle/a1") else {
         return;
-    }
+    };
+    let folder = folder.as_path();
     let camera = camera_ingest::load_camera(&folder.join("camera.toml")).unwrap();
     let motion = pose_of(folder);
     let track = true_keypoints_of(folder);

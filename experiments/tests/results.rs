@@ -149,6 +149,7 @@ fn wrong_input_is_refused_with_the_reason() {
     for (line, words) in [
         ("wiggle-ablation --method nn", &["one wiggle only"][..]),
         ("sensitivity-maps --method cmaes", &["maps of the network"]),
+        ("sysid --ropes 0", &["--ropes"]),
         ("bench", &["NAME"]),
         ("bench wibble", &["wibble", "possible values", "rope"]),
         ("bench track", &["--video", "camera.toml"]),

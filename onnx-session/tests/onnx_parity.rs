@@ -6,6 +6,9 @@
     reason = "tests may fail loudly"
 )]
 
+#[path = "../../hil-tests/support/missing.rs"]
+mod missing;
+
 use arm_model::Pole;
 use planner::features::{WIDTHS, WiggleFeatures};
 use planner::observation::{Observation, ObservedPoints};
@@ -54,8 +57,7 @@ fn films(net: &PhiNet) -> Vec<WiggleFeatures> {
 
 #[test]
 fn the_shipped_networks_give_what_an_onnx_runtime_gives() {
-    if std::env::var_os(onnx_session::LIBRARY).is_none() {
-        println!("skipped: ORT_DYLIB_PATH names no ONNX Runtime library");
+    if missing::named(onnx_session::LIBRARY, "ONNX Runtime library").is_none() {
         return;
     }
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/models");

@@ -12,6 +12,7 @@ use crate::xarm::{COMMAND_PORT, REPORT_PORTS};
 use arm_model::{ArmResponse, Limits, Pole};
 use serde::{Deserialize, Deserializer, Serialize};
 use shared_types::CommandInterface;
+use shared_types::file_error::why;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 
@@ -315,7 +316,7 @@ pub fn measured_lags(response: &ArmResponse) -> Result<MeasuredLags, ConfigError
 fn read_toml<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, ConfigError> {
     let path_of = path.display();
     let text = std::fs::read_to_string(path)
-        .map_err(|reason| ConfigError(format!("cannot read {path_of}: {reason}")))?;
+        .map_err(|reason| ConfigError(format!("cannot read {path_of}: {}", why(&reason))))?;
     toml::from_str(&text)
         .map_err(|reason| ConfigError(format!("{path_of} is not a valid configuration: {reason}")))
 }

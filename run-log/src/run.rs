@@ -108,7 +108,7 @@ impl Run {
     pub fn recording(&self) -> Result<Recording> {
         let path = self.recorded.clone();
         let path = path.ok_or_else(|| NoRecording(self.folder.clone()))?;
-        let mut bytes = std::fs::read(&path).with_context(cannot_read(&path))?;
+        let mut bytes = std::fs::read(&path).map_err(cannot_read(&path))?;
         let of_mcap = is_mcap(&bytes);
         if of_mcap {
             bytes = replay_bytes(&bytes).with_context(|| format!("`{}`", path.display()))?;

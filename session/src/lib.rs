@@ -12,6 +12,7 @@ mod live;
 mod presence;
 mod received;
 mod run_file;
+mod service;
 mod supervisor;
 
 pub use live::{Confirmation, Session};
@@ -19,4 +20,5 @@ pub use presence::Switch;
 pub use received::Received;
 use run_file::RunFile;
 pub use run_file::remedy;
+pub use service::of_service;
 pub use supervisor::{ProcessSpec, Supervisor};

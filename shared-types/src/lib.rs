@@ -22,6 +22,8 @@ extern crate alloc;
 pub mod camera;
 pub mod command_interface;
 pub mod fault;
+#[cfg(feature = "std")]
+pub mod file_error;
 pub mod ipc;
 #[cfg(feature = "std")]
 pub mod keypoints;

@@ -1,6 +1,7 @@
 //! A printed ChArUco board: what is on it, where it hangs, and its corners in a
 //! picture.
 
+use shared_types::file_error::why;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};
@@ -81,7 +82,7 @@ impl Board {
             path: path.to_owned(),
             reason,
         };
-        let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
+        let text = std::fs::read_to_string(path).map_err(|e| fail(why(&e)))?;
         let board: Self = toml::from_str(&text).map_err(|e| fail(e.to_string()))?;
         board.detector().map_err(fail)?;
         let r = board.rotation();

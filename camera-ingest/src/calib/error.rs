@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::path::Path;
 
+use shared_types::file_error::why;
+
 use crate::whole_file::write_whole;
 
 /// Which calibration or `camera.toml` cannot be used, why, and what to do.
@@ -13,12 +15,7 @@ pub struct CalibError(String);
 impl CalibError {
     /// The system's reason at `path`.
     pub(super) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        |source| {
-            Self::calibration(
-                path,
-                format!("{source} (check the path and its permissions)"),
-            )
-        }
+        |source| Self::calibration(path, why(&source))
     }
 
     /// `camera.toml` cannot be used; `reason` names the field.

@@ -8,6 +8,7 @@ use onnx_session::ort;
 use ort::session::Session;
 use ort::value::{Outlet, TensorElementType, TensorRef};
 use sha2::{Digest, Sha256};
+use shared_types::file_error::why;
 
 use super::picture::Size;
 use crate::track::ModelError;
@@ -59,11 +60,8 @@ impl Graph {
         outputs: &[Wanted],
     ) -> Result<Self, ModelError> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|reason| {
-            ModelError::Unfit(format!(
-                "model {name}: {reason} (check the path and its permissions)"
-            ))
-        })?;
+        let bytes = std::fs::read(path)
+            .map_err(|reason| ModelError::Unfit(format!("model {name}: {}", why(&reason))))?;
         let session = onnx_session::open(&bytes).map_err(|error| match error {
             OpenError::NoRuntime(reason) => ModelError::Runtime {
                 path: name.clone(),

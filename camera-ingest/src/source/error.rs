@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::path::Path;
 
+use shared_types::file_error::why;
+
 use crate::frame::FrameError;
 
 /// Which recording cannot be read, why, and what to do.
@@ -17,12 +19,7 @@ impl SourceError {
 
     /// The system's reason at `path`.
     pub(super) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        |source| {
-            Self::video(
-                path,
-                format!("{source} (check the path and its permissions)"),
-            )
-        }
+        |source| Self::video(path, why(&source))
     }
 
     /// A frame, counted from 0, is damaged.

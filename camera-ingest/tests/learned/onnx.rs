@@ -1,15 +1,6 @@
 //! Small ONNX files, written field by field as `onnx.proto` numbers them.
 #![allow(dead_code, reason = "not every test file uses everything")]
 
-/// Whether no ONNX Runtime is named, which is said: there is nothing to test with.
-pub(crate) fn no_runtime() -> bool {
-    let named = std::env::var_os("ORT_DYLIB_PATH").is_some();
-    if !named {
-        println!("skipped: ORT_DYLIB_PATH names no ONNX Runtime library");
-    }
-    !named
-}
-
 /// `TensorProto.DataType`.
 pub(crate) const FLOAT: u64 = 1;
 pub(crate) const DOUBLE: u64 = 11;

@@ -1,6 +1,9 @@
 //! The rendered recordings with their exact truth, as tests use them.
 #![allow(dead_code, reason = "not every test file uses everything")]
 
+#[path = "../../../hil-tests/support/missing.rs"]
+pub(crate) mod missing;
+
 use std::path::{Path, PathBuf};
 
 use arm_model::{JointVector, Pole};
@@ -11,13 +14,7 @@ use shared_types::StereoCamera;
 
 /// A file of the shared data; `None`, with a message, where it is missing.
 pub(crate) fn shared(name: &str) -> Option<PathBuf> {
-    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let path = Path::new(data).join(name);
-    if !path.exists() {
-        println!("skipped: {} not found", path.display());
-        return None;
-    }
-    Some(path)
+    missing::shared(&format!("data/{name}"))
 }
 
 /// Folder of a wiggle or a throw.

@@ -49,9 +49,6 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let figure = |t: &Trial| t.residual_px;
     let requested = experiment.sequence(ROPES, 4, (figure, "ropes, residual px"));
     let ropes = requested.count;
-    if ropes == 0 {
-        return Err(bad_input!("--ropes is 0, but must be 1 or more"));
-    }
     let wiggles = ablated_wiggles(&config.wiggle).or_failed()?;
     // The network is not taken along: it is trained on one wiggle only.
     let wiggling = |w: &AblatedWiggle| TrialRig {

@@ -2,11 +2,9 @@
 
 use super::fate::{Fate, Tracked};
 use super::score::CONFIDENCES;
+use experiments::trials::wilson;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// Normal quantile of 95 % limits.
-const Z: f64 = 1.959_964;
 
 /// Films that have something in common.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -100,31 +98,4 @@ pub(super) fn rows(all: &[Tracked]) -> Vec<Row> {
         .into_iter()
         .map(|((_, name), films)| Row::of(name, films));
     std::iter::once(all).chain(groups).collect()
-}
-
-/// A part and the limits between which the true one lies with 95 %, after Wilson.
-fn wilson(hits: usize, n: usize) -> [f64; 3] {
-    if n == 0 {
-        return [0.0, 0.0, 1.0];
-    }
-    let (n, part) = (n as f64, hits as f64 / n as f64);
-    let centre = part + Z * Z / (2.0 * n);
-    let spread = Z * (part * (1.0 - part) / n + Z * Z / (4.0 * n * n)).sqrt();
-    let scale = 1.0 + Z * Z / n;
-    let limit = |v: f64| (v / scale).clamp(0.0, 1.0);
-    [part, limit(centre - spread), limit(centre + spread)]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Newcombe, Statistics in Medicine 17 (1998), table I: 81 of 263, and 0 of 20.
-    #[test]
-    fn limits_are_those_of_the_literature() {
-        let [_, low, high] = wilson(81, 263);
-        assert!((low - 0.2553).abs() < 5e-5 && (high - 0.3662).abs() < 5e-5);
-        let [_, low, high] = wilson(0, 20);
-        assert!(low == 0.0 && (high - 0.1611).abs() < 5e-5);
-    }
 }

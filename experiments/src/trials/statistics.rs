@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Normal quantile of 95 % limits.
+const Z: f64 = 1.959_964;
+
 /// Mean; zero for none.
 #[must_use]
 pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
@@ -34,6 +37,20 @@ pub fn area_under_curve(outside: &[f64], inside: &[f64]) -> f64 {
         })
         .sum();
     wins / (outside.len() * inside.len()).max(1) as f64
+}
+
+/// A part and the limits between which the true one lies with 95 %, after Wilson.
+#[must_use]
+pub fn wilson(hits: usize, n: usize) -> [f64; 3] {
+    if n == 0 {
+        return [0.0, 0.0, 1.0];
+    }
+    let (n, part) = (n as f64, hits as f64 / n as f64);
+    let centre = part + Z * Z / (2.0 * n);
+    let spread = Z * (part * (1.0 - part) / n + Z * Z / (4.0 * n * n)).sqrt();
+    let scale = 1.0 + Z * Z / n;
+    let limit = |v: f64| (v / scale).clamp(0.0, 1.0);
+    [part, limit(centre - spread), limit(centre + spread)]
 }
 
 /// How errors spread (m).
@@ -82,6 +99,21 @@ mod tests {
     fn the_area_counts_pairs() {
         assert_eq!(area_under_curve(&[2.0, 3.0], &[1.0, 2.0]), 0.875);
         assert_eq!(area_under_curve(&[1.0], &[2.0]), 0.0);
+    }
+
+    /// Newcombe, Statistics in Medicine 17 (1998), table I: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
+    #[test]
+    fn limits_of_a_part_are_those_of_the_literature() {
+        for (hits, n, low, high) in [
+            (81, 263, 0.2553, 0.3662),
+            (15, 148, 0.0624, 0.1605),
+            (0, 20, 0.0, 0.1611),
+            (1, 29, 0.0061, 0.1718),
+        ] {
+            let [_, found_low, found_high] = wilson(hits, n);
+            let within = (found_low - low).abs() < 5e-5 && (found_high - high).abs() < 5e-5;
+            assert!(within, "{hits} of {n}: {found_low} to {found_high}");
+        }
     }
 
     #[test]

@@ -5,6 +5,9 @@
     reason = "every test file compiles its own copy"
 )]
 
+#[path = "../../../hil-tests/support/missing.rs"]
+pub mod missing;
+
 use serde_json::Value;
 use std::process::{Command, Output};
 

@@ -4,6 +4,7 @@ use super::camera_pose::CORRECTIONS;
 use super::error::IdentifyError;
 use crate::OutOfRange;
 use crate::observation::Observation;
+use arm_model::Pole;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
@@ -31,6 +32,16 @@ impl Method {
     #[must_use]
     pub fn asks_network(self) -> bool {
         matches!(self, Self::Network | Self::Hybrid)
+    }
+
+    /// What to know where a network judges the film of another pole than it was trained with.
+    #[must_use]
+    pub fn warning_of_pole(self, pole: &Pole) -> Option<&'static str> {
+        let is_other = pole.end_m() != Pole::default().end_m();
+        (self.asks_network() && is_other).then_some(
+            "the network was trained with the built-in pole, not with this one; compare \
+             `wag identify --method hybrid-search`",
+        )
     }
 }
 
@@ -249,5 +260,16 @@ mod tests {
                 other => panic!("{name}: {other:?}"),
             }
         }
+    }
+
+    #[test]
+    fn another_pole_is_warned_of_where_a_network_is_asked() {
+        let longer = Pole {
+            length_m: 0.3,
+            ..Pole::default()
+        };
+        assert!(Method::Hybrid.warning_of_pole(&longer).is_some());
+        assert!(Method::Hybrid.warning_of_pole(&Pole::default()).is_none());
+        assert!(Method::HybridSearch.warning_of_pole(&longer).is_none());
     }
 }

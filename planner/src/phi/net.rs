@@ -6,6 +6,7 @@ use super::probe::{PARITY, difference, probe};
 use crate::features::{ObserveError, ViewPlane, WiggleFeatures, observe};
 use crate::observation::{Observation, ObservedPoints};
 use crate::wiggle::wiggling_arm;
+use shared_types::file_error::why;
 use shared_types::rope::ROPE_PARAMETERS;
 use std::path::Path;
 
@@ -60,7 +61,7 @@ impl PhiNet {
     /// Loads a model file.
     pub fn load(path: &Path) -> Result<Self, ModelError> {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|error| ModelError::new(&name, error))?;
+        let bytes = std::fs::read(path).map_err(|error| ModelError::new(&name, why(&error)))?;
         Self::from_bytes(&name, &bytes)
     }
 

@@ -5,7 +5,7 @@ use arm_model::capsules::arm_at;
 use arm_model::geometry::Capsule;
 use arm_model::joint::START_POSE;
 use arm_model::kinematics::JOINT_ORIGIN_M;
-use arm_model::{Cell, JointVector, Pole};
+use arm_model::{Cell, JointVector, Pole, unit_hint};
 use nalgebra::Vector3;
 
 /// Height of the shoulder, the common point of joints 1 to 3 (m).
@@ -94,10 +94,12 @@ pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Resul
     } else {
         return Ok(());
     };
+    let farthest_m = target_m.into_iter().map(f64::abs).fold(0.0, f64::max);
+    let hint = unit_hint("target_m", farthest_m, radius_max);
     Err(PlanError::Unreachable {
         target_m,
         nearest_m: nearest(rho, target_m, rho_max, radius_max, floor_z_m),
-        reason,
+        reason: reason + hint,
     })
 }
 
@@ -131,6 +133,17 @@ mod tests {
         let target = [0.8, -0.5, 0.3];
         let (p, _) = Pole::default().attach_pose(&start_pose_for(target));
         assert!((p.y.atan2(p.x) - target[1].atan2(target[0])).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_target_in_millimetres_is_asked_about() {
+        let said = |target_m| {
+            check_reach(target_m, 0.5, &Cell::default())
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(said([1000.0, 0.0, 400.0]).contains("is it in mm?"));
+        assert!(!said([1.7, 0.0, 0.4]).contains("is it in mm?"));
     }
 
     #[test]

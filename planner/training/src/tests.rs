@@ -1,5 +1,8 @@
 //! A tiny training from ropes to a model file, and the network that is shipped.
 
+#[path = "../../../hil-tests/support/missing.rs"]
+mod missing;
+
 use crate::batches::{Batch, Studio};
 use crate::checkpoint::{State, path_in};
 use crate::config::TrainingConfig;
@@ -189,10 +192,7 @@ fn in_runtime(
     features: &FeatureDefinition,
     films: &[WiggleFeatures],
 ) -> Option<Vec<Predicted>> {
-    if std::env::var_os(onnx_session::LIBRARY).is_none() {
-        println!("skipped: ORT_DYLIB_PATH names no ONNX Runtime library");
-        return None;
-    }
+    missing::named(onnx_session::LIBRARY, "ONNX Runtime library")?;
     let mut session = onnx_session::open(bytes).unwrap();
     let shape = [1, features.frames, features.channels()];
     let predicted = films.iter().map(|film| {

@@ -1,24 +1,19 @@
 //! The reference trajectories of `shared/reference/rope-truth`.
 
+#[path = "../../../hil-tests/support/missing.rs"]
+mod missing;
+
 use rope_sim::{
     Candidate, FrameTimes, Kernel, PoseRow, PoseTrack, Precision, Rollout, Scene, SimOptions,
     Start, npy, roll_out_in_with,
 };
 use shared_types::RopeParams;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Where the reference trajectories are, if they are.
 pub fn truth_folder() -> Option<PathBuf> {
-    let folder = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../shared/reference/rope-truth"
-    );
-    let folder = PathBuf::from(folder);
-    if !folder.join("manifest.json").is_file() {
-        println!("skipped: {} not found", folder.display());
-        return None;
-    }
-    Some(folder)
+    let manifest = missing::shared("reference/rope-truth/manifest.json")?;
+    manifest.parent().map(Path::to_owned)
 }
 
 /// One rope on one motion with its reference trajectory.

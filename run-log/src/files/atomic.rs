@@ -1,7 +1,8 @@
 //! Whole-file writes: a temporary file beside the target, then a rename. What is
 //! no regular file (a device, a pipe) is written to as it is.
 
-use anyhow::{Context, Result};
+use anyhow::{Result, anyhow};
+use shared_types::file_error::why;
 use std::fs::{File, Metadata};
 use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::PermissionsExt;
@@ -67,23 +68,20 @@ fn temporary(path: &Path) -> io::Result<NamedTempFile> {
         .permissions(PermissionsExt::from_mode(0o666))
         .tempfile_in(folder_of(path))
         .map_err(|e| match e.kind() {
-            ErrorKind::NotFound => io::Error::new(ErrorKind::NotFound, "there is no such folder"),
+            ErrorKind::NotFound => io::Error::other("there is no such folder"),
             kind => kind.into(),
         })
 }
 
 /// What a failure to write `path` is called.
-pub(crate) fn cannot_write(path: &Path) -> impl FnOnce() -> String + '_ {
-    move || {
-        let name = path.display();
-        format!("cannot write `{name}`; check that its folder exists and is writable")
-    }
+pub(crate) fn cannot_write(path: &Path) -> impl FnOnce(io::Error) -> anyhow::Error + '_ {
+    move |error| anyhow!("cannot write `{}`: {}", path.display(), why(&error))
 }
 
 /// Writes `bytes` to `path` so that a reader sees the old or the new file,
 /// never a part of one. Links stay links, permissions stay as they are.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
-    put(path, bytes).with_context(cannot_write(path))
+    put(path, bytes).map_err(cannot_write(path))
 }
 
 fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -118,7 +116,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
         Ok(Target::File(real, _)) => temporary(&real).map(drop),
         Err(e) => Err(e),
     };
-    tried.with_context(cannot_write(path))
+    tried.map_err(cannot_write(path))
 }
 
 /// Writes `value` as indented JSON with a final newline.

@@ -22,7 +22,7 @@ const JOINT_MAX_RAD: f64 = 7.5;
 /// and the first one increasing.
 pub fn read_table(path: &Path, header: &[&str]) -> Result<Vec<Vec<f64>>> {
     let name = path.display();
-    let file = std::fs::File::open(path).with_context(cannot_read(path))?;
+    let file = std::fs::File::open(path).map_err(cannot_read(path))?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .from_reader(file);

@@ -7,29 +7,18 @@ use arm_model::response::Excitation;
 use arm_model::{ArmResponse, Cell};
 use serde::de::DeserializeOwned;
 use shared_types::Plan;
+use shared_types::file_error::why;
 use shared_types::plan::trajectory_hash_hex;
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// What a failure to read `path` is called.
-pub(crate) fn cannot_read(path: &Path) -> impl FnOnce() -> String + '_ {
-    move || {
-        let name = path.display();
-        format!("cannot read `{name}`; check the path and its permissions")
-    }
+pub(crate) fn cannot_read(path: &Path) -> impl FnOnce(std::io::Error) -> anyhow::Error + '_ {
+    move |error| anyhow!("cannot read `{}`: {}", path.display(), why(&error))
 }
 
 /// Reads a text file.
 pub fn read_text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|error| {
-        let name = path.display();
-        let why = match error.kind() {
-            ErrorKind::IsADirectory => "it is a folder",
-            ErrorKind::InvalidData => "it is not a text file in UTF-8",
-            _ => return anyhow::Error::new(error).context(cannot_read(path)()),
-        };
-        anyhow!("cannot read `{name}`: {why}")
-    })
+    std::fs::read_to_string(path).map_err(cannot_read(path))
 }
 
 /// Reads JSON.

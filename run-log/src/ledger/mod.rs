@@ -48,16 +48,25 @@ pub fn find(places: &[PathBuf]) -> Result<Vec<Entry>> {
             found.push(place.clone());
             continue;
         }
-        let inside = place.read_dir().with_context(cannot_read(place))?;
+        let inside = place.read_dir().map_err(cannot_read(place))?;
         let mut runs: Vec<PathBuf> = inside
             .flatten()
             .map(|entry| entry.path())
-            .filter(|path| is_run(path))
+            .filter(|path| is_run(path) && is_nameable(path))
             .collect();
         runs.sort();
         found.append(&mut runs);
     }
     found.iter().map(|run| read(run)).collect()
+}
+
+/// Whether a list, which is UTF-8, can name a folder; says so where it cannot.
+fn is_nameable(folder: &Path) -> bool {
+    let is_nameable = folder.to_str().is_some();
+    if !is_nameable {
+        tracing::warn!("`{}` is left out: its name is not UTF-8", folder.display());
+    }
+    is_nameable
 }
 
 /// Whether a folder is a run's own: it says how it was made or what came of it, or holds

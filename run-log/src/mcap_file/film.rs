@@ -128,7 +128,7 @@ impl RunFilm {
     /// writes it.
     pub fn read(path: &Path) -> Result<Self> {
         let fail = || format!("run file `{}`", path.display());
-        let bytes = std::fs::read(path).with_context(cannot_read(path));
+        let bytes = std::fs::read(path).map_err(cannot_read(path));
         let bytes = bytes.with_context(fail)?;
         let mut film = Self {
             path: path.to_owned(),
@@ -278,7 +278,8 @@ impl RunFilm {
             .with_context(|| {
                 format!(
                     "{name}: no picture is there from just before motion {number} began, when \
-                     the rope hung still"
+                     the rope hung still: wiggle again with --camera, or name the film with \
+                     --video and its motion with --joints"
                 )
             })?;
         let count = self.pictures[first..]

@@ -33,7 +33,7 @@ pub struct Recovered {
 /// It cannot be read or written, or is no MCAP file.
 pub fn recover(path: &Path) -> Result<Recovered> {
     let fail = || format!("`{}`", path.display());
-    let bytes = std::fs::read(path).with_context(cannot_read(path))?;
+    let bytes = std::fs::read(path).map_err(cannot_read(path))?;
     let mut writer = options().create(Cursor::new(Vec::new()))?;
     let mut found = Recovered::default();
     let mut span_ns: Option<(u64, u64)> = None;

@@ -49,8 +49,9 @@ impl McapFile {
             .write(true)
             .create_new(true)
             .open(path)
-            .with_context(cannot_write(path))?;
-        let mut writer = options().create(file).with_context(cannot_write(path))?;
+            .map_err(cannot_write(path))?;
+        let fail = || format!("cannot write `{}`", path.display());
+        let mut writer = options().create(file).with_context(fail)?;
         let schemas = Schemas::read()?;
         let mut ids = Vec::new();
         for (_, topic, schema) in Channel::ALL {

@@ -2,7 +2,7 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use shared_types::Task;
-use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
+use std::net::{IpAddr, ToSocketAddrs};
 use std::str::FromStr;
 
 /// One of these by its name, each with what `--help` says of it; one of which it says
@@ -61,7 +61,8 @@ pub(super) fn host(text: &str) -> Result<IpAddr, String> {
     if let Ok(address) = text.parse() {
         return Ok(address);
     }
-    if text.parse::<SocketAddr>().is_ok() {
+    let port = text.rsplit_once(':').map(|(_, port)| port.parse::<u16>());
+    if matches!(port, Some(Ok(_))) {
         return Err(format!("`{text}` has a port: name it with --command-port"));
     }
     let found: Vec<IpAddr> = (text, 0u16)

@@ -2,13 +2,14 @@
 
 use crate::cli::SceneArgs;
 use crate::config;
-use anyhow::{Context, anyhow, bail, ensure};
+use anyhow::{anyhow, bail, ensure};
 use camera_ingest::source::{AnySource, BothImages, run_file};
 use camera_ingest::{load_camera, open_video};
 use cli_output::{OrInput, Outcome};
 use run_log::files;
 use run_log::{ClampMotion, Run};
 use shared_types::StereoCamera;
+use shared_types::file_error::why;
 use std::path::{Path, PathBuf};
 
 const NO_MOTION: &str = "name the clamp's motion with --joints or --pose";
@@ -54,10 +55,7 @@ impl FilmInput {
         // Named alone it is meant for a run: say so if it is not there.
         if scene.camera.is_none() && !scene.motion.is_given() {
             std::fs::metadata(video)
-                .with_context(|| {
-                    let name = video.display();
-                    format!("cannot read `{name}`; check the path and its permissions")
-                })
+                .map_err(|e| anyhow!("cannot read `{}`: {}", video.display(), why(&e)))
                 .or_input()?;
         }
         match run_of(video) {

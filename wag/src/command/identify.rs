@@ -2,7 +2,7 @@
 
 use super::film_input::{FilmInput, named_motion};
 use super::learned::Learned;
-use super::network::{network, no_model_without_network, warning_of_pole};
+use super::network::{network, no_model_without_network};
 use super::plan::LOOK;
 use super::track::{overlay, track_video};
 use super::unconfirmed::confirm;
@@ -103,11 +103,16 @@ impl Observed {
 
 /// What to know about the pole, where a network is asked.
 fn other_pole(motion: &ClampMotion, method: Method) -> Option<String> {
-    warning_of_pole(method, motion.pole()?).map(str::to_owned)
+    method.warning_of_pole(motion.pole()?).map(str::to_owned)
 }
 
 fn read_keypoints(path: &Path) -> anyhow::Result<KeypointTrack> {
-    let fail = || format!("keypoints `{}`", path.display());
+    let fail = || {
+        format!(
+            "`{}` is not keypoints (JSON, as `wag track` writes them)",
+            path.display()
+        )
+    };
     let track: KeypointTrack = serde_json::from_str(&files::read_text(path)?).with_context(fail)?;
     track.validate().with_context(fail)?;
     Ok(track)

@@ -1,6 +1,5 @@
 //! The network that reads rope parameters: the one inside this program, or a file.
 
-use arm_model::Pole;
 use cli_output::{OrInput, Outcome};
 use planner::identify::Method;
 use planner::phi::PhiNet;
@@ -21,13 +20,4 @@ pub fn no_model_without_network(method: Method, model: Option<&Path>) -> Outcome
         )),
         _ => Ok(()),
     }
-}
-
-/// What to know where a network judges the film of another pole than it was trained with.
-pub fn warning_of_pole(method: Method, pole: &Pole) -> Option<&'static str> {
-    let is_other = pole.end_m() != Pole::default().end_m();
-    (method.asks_network() && is_other).then_some(
-        "the network was trained with the built-in pole, not with this one; compare \
-         `wag identify --method hybrid-search`",
-    )
 }

@@ -10,7 +10,6 @@ use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use run_log::{Cycles, files};
 use serde_json::{Value, json};
 use session::{Confirmation, Session, Switch};
-use shared_types::ipc::IpcError;
 use shared_types::{OperatingMode, Plan};
 use std::path::{Path, PathBuf};
 
@@ -51,7 +50,7 @@ pub fn on_arm(
             &folder,
             (&address, arm.acknowledge),
             limits,
-            start,
+            (start, plan.map(|plan| plan.target_m)),
             &mut found,
         )?;
         let mut value = work(session, &link)?;
@@ -65,12 +64,17 @@ pub fn on_arm(
     let cycles = std::mem::take(&mut session.received.cycles);
     let epoch_ns = cycles.cycles.first().map_or(0, |c| c.deadline_ns);
     let by_service = address.service.is_some();
-    let result = result.map_err(|error| of_service(by_service, error));
+    let result = result.map_err(|error| session::of_service(by_service, error));
     let result = result.and_then(|value| conclude(folder.path.as_path(), cycles, value));
     let mut summary = match &result {
         Ok(value) => value.clone(),
         Err(e) => json!({ "ok": false, "error": format!("{e:#}") }),
     };
+    summary["command"] = name.into();
+    if let Some(plan) = plan {
+        summary["task"] = json!(plan.task);
+        summary["target_m"] = json!(plan.target_m);
+    }
     summary["epoch_ns"] = epoch_ns.into();
     summary["operator"] = json!(operator);
     summary["confirmed"] = confirmations(&session).into();
@@ -148,27 +152,17 @@ pub fn confirmations(session: &Session) -> Vec<Value> {
     session.confirmed.iter().map(confirmed).collect()
 }
 
-/// What to do when the controller that ended was not this command's own.
-pub fn of_service(by_service: bool, error: anyhow::Error) -> anyhow::Error {
-    match error.downcast_ref() {
-        Some(IpcError::Gone { .. }) if by_service => error.context(
-            "the controller that runs as a service ended; an arm that moved is stopped by its guardian, whose log says so: look at the arm, and start both again",
-        ),
-        _ => error,
-    }
-}
-
 /// Starts everything and moves to the start pose; what was `found` on the way.
 fn bring_up(
     session: &mut Session,
     folder: &RunFolder,
     (address, acknowledges): (&ArmAddress, bool),
     limits: &Limits,
-    start: JointVector,
+    (start, target_m): (JointVector, Option<[f64; 3]>),
     found: &mut BringUp,
 ) -> anyhow::Result<ArmLink> {
     let stage = Stage::begin("bring-up");
-    pipeline::start_recorder(session, folder, limits, None, None)?;
+    pipeline::start_recorder(session, folder, limits, None, target_m)?;
     let link = pipeline::controller(session, folder, limits, address)?;
     enable(session, &link, (address, acknowledges), found)?;
     stage.done("arm enabled");

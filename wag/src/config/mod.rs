@@ -11,7 +11,7 @@ use anyhow::bail;
 use arm_model::Cell;
 use clap::ValueEnum;
 use layers::{Folders, difference};
-use run_log::files::CAMERA;
+use run_log::files::{CAMERA, misnamed};
 use run_log::{CellHere, Run};
 use shared_types::Plan;
 use std::path::{Path, PathBuf};
@@ -98,8 +98,19 @@ pub fn camera_file() -> anyhow::Result<Option<PathBuf>> {
     Ok(places(CAMERA)?.find(|file| file.exists()))
 }
 
-/// Refuses to begin with files that cannot be read as what they configure.
+/// Refuses to begin with files that cannot be read as what they configure, and warns of those that
+/// nothing reads because of a slip in their name.
 pub fn check_here() -> anyhow::Result<()> {
+    let kinds = Kind::value_variants()
+        .iter()
+        .map(|kind| kind.built_in().file);
+    let read: Vec<&str> = kinds.chain([CAMERA, RESPONSE_FILE]).collect();
+    let Folders { site, rig } = Folders::here()?;
+    for folder in [site, rig].into_iter().flatten() {
+        for (path, meant) in misnamed(&folder, &read) {
+            tracing::warn!("`{}` is not read; did you mean `{meant}`?", path.display());
+        }
+    }
     Kind::value_variants()
         .iter()
         .try_for_each(|kind| layers(*kind, None).map(drop))

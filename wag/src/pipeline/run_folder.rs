@@ -3,6 +3,7 @@
 use anyhow::Context;
 use cli_output::{OrInput, Outcome};
 use run_log::{CommandLine, files, ledger};
+use shared_types::file_error::why;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -23,13 +24,11 @@ impl RunFolder {
         Self::refuse_existing(&path)?;
         crate::config::check_here().or_input()?;
         for folder in ["config", "log"] {
-            let refused = || {
-                let path = path.display();
-                format!("cannot create run folder `{path}`; name a writable one with --out")
+            let refused = |e| {
+                let (path, why) = (path.display(), why(&e));
+                bad_input!("cannot create run folder `{path}`: {why}; --out names another")
             };
-            std::fs::create_dir_all(path.join(folder))
-                .with_context(refused)
-                .or_input()?;
+            std::fs::create_dir_all(path.join(folder)).map_err(refused)?;
         }
         let folder = Self {
             path,

@@ -3,8 +3,8 @@
 //! no motion.
 
 use super::support::{
-    Rig, alone, command, ended, has, json, process_of, refused_in, said, send, shared_memory_of,
-    until, until_recorded, wag,
+    Rig, alone, command, ended, has, json, missing, process_of, refused_in, said, send,
+    shared_memory_of, until, until_recorded, wag,
 };
 use mcap::{MessageStream, Summary};
 use rustix::process::Signal;
@@ -32,8 +32,7 @@ fn topics(bytes: &[u8]) -> BTreeMap<String, u64> {
 fn python_agrees(file: &Path) {
     const TOPICS: &str = "/arm/measured /arm/commanded /controller/cycles /tf /scene /log \
                           /wag/replay /wag/summary";
-    let Some(python) = std::env::var_os("WAG_SDK_PYTHON") else {
-        eprintln!("skipped: WAG_SDK_PYTHON does not name a Python with mcap and jsonschema");
+    let Some(python) = missing::named("WAG_SDK_PYTHON", "Python with mcap and jsonschema") else {
         return;
     };
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../.ci/validate-mcap");

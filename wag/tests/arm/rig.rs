@@ -1,7 +1,9 @@
 //! `wag rig`: one in each domain, which leaves nothing; the vendor's own Python client
 //! against it, by the conformance check that lies beside the checkout.
 
-use super::support::{Rig, alone, beside_others, has, said, shared, shared_memory_of, wag};
+use super::support::{
+    Rig, alone, beside_others, has, missing, said, shared, shared_memory_of, wag,
+};
 use rustix::process::Signal;
 use std::process::Command;
 
@@ -55,11 +57,7 @@ print('both agree')
 
 /// A Python with the vendor's SDK; `None`, said aloud, where there is none.
 fn python() -> Option<Command> {
-    let python = std::env::var_os("WAG_SDK_PYTHON");
-    if python.is_none() {
-        println!("skipped: WAG_SDK_PYTHON does not name a Python with xarm-python-sdk installed");
-    }
-    python.map(Command::new)
+    missing::named("WAG_SDK_PYTHON", "Python with xarm-python-sdk").map(Command::new)
 }
 
 #[test]

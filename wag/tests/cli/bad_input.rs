@@ -65,7 +65,13 @@ fn what_is_no_text_file_is_called_by_its_name() {
     for (line, said) in [
         ("check .", "it is a folder"),
         ("check binary.json", "not a text file in UTF-8"),
-        ("check none.json", "check the path and its permissions"),
+        ("check none.json", "no such file or folder; check the path"),
+        ("check none.json/plan.json", "no such file or folder"),
+        (
+            "check binary.json/plan.json",
+            "a part of its path is a file",
+        ),
+        ("wiggle --csv /dev/full", "no room is left there"),
         ("wiggle --csv no/w.csv", "there is no such folder"),
     ] {
         let refusal = refused_in(folder.path(), 2, line);

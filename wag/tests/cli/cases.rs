@@ -27,6 +27,7 @@ pub(crate) const MACHINES: &str = "
     rig --camera x => --rope
     run => --arm | --controller
     run --arm 127.0.0.1:502 => port | --command-port
+    run --arm localhost:502 => port | --command-port
     run --arm 127.0.0.1 => --camera | /dev/videoN
     run --arm 127.0.0.1 --camera /dev/video99 --target 0.9,0,0.3 => no camera | /dev/video99
     run --arm 127.0.0.1 --camera nobody => nobody | --calibration

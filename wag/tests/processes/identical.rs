@@ -10,6 +10,8 @@ use planner::PlannerConfig;
 use planner::plan::{PlanOptions, PlanRequest};
 use planner::ropes::random_rope;
 use planner::service::{PlannerRequest, PlannerRpc};
+use run_log::files::{PLAN, SUMMARY, read_json, read_plan};
+use serde_json::{Value, json};
 use shared_types::ipc::message::{CameraRequest, CameraRpc};
 use shared_types::ipc::rpc::{Rpc, RpcClient};
 use shared_types::ipc::{Bus, ControllerMode, CycleRecord, DomainSweep, StateReader};
@@ -154,6 +156,13 @@ fn throw(folder: &Path, name: &str, murder: bool) -> Vec<CycleRecord> {
     // Its end at rest is a stop, too.
     let met: Vec<_> = causes.iter().map(|c| (c.fault(), c.motion_id)).collect();
     assert_eq!(met, [(FaultCode::OperatorStop, 0)]);
+    // What it was for is kept with it.
+    let kept = read_plan(&run.join(PLAN)).unwrap();
+    assert_eq!(kept.trajectory, plan());
+    let summary: Value = read_json(&run.join(SUMMARY)).unwrap();
+    let told = ["command", "task"].map(|key| summary[key].as_str().unwrap_or_default());
+    assert_eq!(told, ["throw", "strike"], "{summary}");
+    assert_eq!(summary["target_m"], json!(kept.target_m));
     let guardian = std::fs::read_to_string(run.join("log/guardian.log")).unwrap();
     assert!(guardian.contains("guarding the controller"), "{guardian}");
     let sent = last_flight(&cycles).filter(|r| r.sent != 0);

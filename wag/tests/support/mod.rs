@@ -1,6 +1,9 @@
 //! `wag` as its users start it, a simulated arm to start it against, and what it recorded.
 #![allow(dead_code, reason = "each test uses a part")]
 
+#[path = "../../../hil-tests/support/missing.rs"]
+pub(crate) mod missing;
+
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, Limits};
 use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
@@ -145,12 +148,7 @@ pub(crate) fn plan_json(motion: &JointTrajectory, rope: &RopeParams) -> Value {
 /// A file or folder of the data beside the checkout; `None`, said aloud, where it is not
 /// there.
 pub(crate) fn shared(path: &str) -> Option<PathBuf> {
-    let shared = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared"));
-    let path = shared.join(path);
-    if !path.exists() {
-        println!("skipped: {} not found", path.display());
-    }
-    path.exists().then_some(path)
+    missing::shared(path)
 }
 
 /// Files of a domain in shared memory.

@@ -1,6 +1,10 @@
 //! A rope in MuJoCo: what `other_reality/rope.py` is asked, in a child process, and what it
 //! answers.
 
+#[cfg(test)]
+#[path = "../../../../hil-tests/support/missing.rs"]
+mod missing;
+
 use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::kinematics::FrameMotion;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
@@ -118,14 +122,7 @@ impl Mujoco {
     /// The Python, or nothing where there is none: said aloud, and a failure in CI.
     #[cfg(test)]
     pub fn for_tests() -> Option<Self> {
-        match Self::from_environment() {
-            Ok(mujoco) => Some(mujoco),
-            Err(missing) if std::env::var_os("CI").is_some() => panic!("{missing}"),
-            Err(missing) => {
-                eprintln!("skipped: {missing}");
-                None
-            }
-        }
+        missing::named(PYTHON, "Python with MuJoCo").map(Self)
     }
 
     /// What a script answers to a request.

@@ -209,10 +209,10 @@ impl Run<'_> {
         if self.record.task != Task::Strike {
             let stage = Stage::begin("score");
             let judged = self.judge(throw, plan, &stage);
-            self.record.stages.score_s = stage.done(&match &judged {
-                Ok(verdict) => format!("by camera: {verdict}"),
-                Err(_) => "the camera could not judge the throw".to_owned(),
-            });
+            self.record.stages.score_s = match &judged {
+                Ok(verdict) => stage.done(&format!("by camera: {verdict}")),
+                Err(_) => stage.failed("the camera could not judge the throw"),
+            };
             match judged {
                 Ok(verdict) => self.record.camera_verdict = Some(verdict),
                 Err(why) => self.record.set_score(Err(why)),
@@ -234,10 +234,10 @@ impl Run<'_> {
             Ok(other) => Err(anyhow!("the camera process answered with {other:?}")),
             Err(reason) => Err(reason),
         };
-        self.record.stages.score_s = stage.done(&match &score {
-            Ok(s) => format!("by camera {:.1} cm", 100.0 * s.closest_m),
-            Err(_) => "the camera could not measure the throw".to_owned(),
-        });
+        self.record.stages.score_s = match &score {
+            Ok(s) => stage.done(&format!("by camera {:.1} cm", 100.0 * s.closest_m)),
+            Err(_) => stage.failed("the camera could not measure the throw"),
+        };
         self.record.set_score(score);
     }
 

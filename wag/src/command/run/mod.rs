@@ -11,7 +11,7 @@ pub use inputs::check_target;
 pub use stages::{Entry, Run, Setup};
 
 use super::area::{asks, limits, operator, reach_measured, require_clear_area, response_for_plans};
-use super::on_arm::{confirmations, of_service, watch_operator};
+use super::on_arm::{confirmations, watch_operator};
 use super::plan_again::{LastThrow, check_thrown};
 use super::runs::explain_stop;
 use super::{dry_run, motion};
@@ -256,6 +256,6 @@ fn on_camera(
         Run::start(&folder, session, record, setup, &stage)?.go(entry)
     };
     in_folder(&folder, record, |session, record| {
-        done(session, record).map_err(|error| of_service(by_service, error))
+        done(session, record).map_err(|error| session::of_service(by_service, error))
     })
 }

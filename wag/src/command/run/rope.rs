@@ -3,7 +3,6 @@
 
 use super::stages::{Run, SETTLED_WITHIN_S, Setup};
 use crate::command::known_rope::KnownRope;
-use crate::command::network::warning_of_pole;
 use crate::command::plan::describe;
 use crate::command::unconfirmed::confirm;
 use crate::pipeline::{arm_for, execute};
@@ -142,7 +141,7 @@ impl Run<'_> {
     ) -> anyhow::Result<KnownRope> {
         let settings = &self.setup.settings;
         let (options, pole) = (settings.identify, settings.cell.pole);
-        if let Some(warning) = warning_of_pole(options.method, &pole) {
+        if let Some(warning) = options.method.warning_of_pole(&pole) {
             self.warn(warning);
         }
         let stage = Stage::begin("identify");

@@ -1,0 +1,194 @@
+//! What the documents' figures are made of: programs that are run, once or with one seed after the
+//! other, and what is kept of each run.
+
+use serde_json::{Map, Value, json};
+
+/// One study.
+#[derive(Debug)]
+pub struct Study {
+    pub name: &'static str,
+    /// Which program is run.
+    pub program: Program,
+    /// Its arguments, beside seed and output.
+    pub args: &'static [&'static str],
+    /// Runs, each with the next seed.
+    pub runs: u64,
+    /// Busy threads beside it.
+    pub load: u16,
+}
+
+/// Programs of this project.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Program {
+    /// `wag`: of each run a row is kept.
+    Wag,
+    /// The same with arm and camera of a `wag rig` beside it.
+    WagBesideRig,
+    /// `experiments`, once: its object is kept.
+    Experiments,
+}
+
+/// All studies. A new one goes to the end: the place of a study gives its seeds.
+pub const STUDIES: [Study; 13] = [
+    throws("strike", &["demo", "--task", "strike"], 100, 0),
+    throws("lob", &["demo", "--task", "lob"], 30, 0),
+    throws("drape", &["demo", "--task", "drape"], 30, 0),
+    throws("strike-loaded", &["demo", "--task", "strike"], 20, 8),
+    once("sim-pipeline", &["sim-pipeline"]),
+    once("lob-drape", &["lob-drape"]),
+    once("full-pipeline", &["full-pipeline"]),
+    once("sysid", &["sysid"]),
+    once("sysid-nn", &["sysid", "--method", "nn"]),
+    once("sysid-ood", &["sysid-ood"]),
+    once("wiggle-ablation", &["wiggle-ablation"]),
+    once("motion-fidelity", &["motion-fidelity"]),
+    Study {
+        program: Program::WagBesideRig,
+        ..throws("two-terminals", &["run", "strike", "--yes"], 10, 0)
+    },
+];
+
+const fn throws(name: &'static str, args: &'static [&'static str], runs: u64, load: u16) -> Study {
+    let program = Program::Wag;
+    Study {
+        name,
+        program,
+        args,
+        runs,
+        load,
+    }
+}
+
+const fn once(name: &'static str, args: &'static [&'static str]) -> Study {
+    let program = Program::Experiments;
+    Study {
+        name,
+        program,
+        args,
+        runs: 1,
+        load: 0,
+    }
+}
+
+/// What is kept of a throw on the rig: how it ended, how far it was off by truth and by camera, the
+/// judgement of each condition, and what it cost. What a run does not have is left out.
+pub fn throw(seed: u64, report: &Value) -> Value {
+    let at = |pointer: &str| report.pointer(pointer).filter(|v| !v.is_null()).cloned();
+    let number = |pointer: &str| at(pointer).and_then(|v| v.as_f64());
+    let mut row = Map::new();
+    row.insert("seed".to_owned(), json!(seed));
+    let mut put = |name: String, value: Option<Value>| {
+        if let Some(value) = value {
+            row.insert(name, value);
+        }
+    };
+    for (name, pointer) in [
+        ("ok", "/ok"),
+        ("error", "/error"),
+        ("miss_m", "/true_tip_target_distance_m"),
+        ("camera_miss_m", "/stereo_tip_target_distance_m"),
+        ("robot_touched", "/truth/rope_touched_robot"),
+        ("simulations", "/identified/simulations"),
+        ("identify_s", "/stages/identify_s"),
+        ("plan_s", "/stages/plan_s"),
+        ("wall_s", "/wall_s"),
+    ] {
+        put(name.to_owned(), at(pointer));
+    }
+    let (truth, camera) = (
+        number("/true_tip_target_distance_m"),
+        number("/stereo_tip_target_distance_m"),
+    );
+    if let (Some(truth), Some(camera)) = (truth, camera) {
+        put(
+            "camera_error_m".to_owned(),
+            Some(json!((camera - truth).abs())),
+        );
+        let [low, high] = ["/score/interval_m/0", "/score/interval_m/1"].map(number);
+        let held = low <= Some(truth) && high >= Some(truth);
+        put("camera_interval_held".to_owned(), Some(json!(held)));
+    }
+    let length = (
+        number("/truth/rope/length_m"),
+        number("/identified/params/length_m"),
+    );
+    if let (Some(truth), Some(found)) = length {
+        put(
+            "length_error_m".to_owned(),
+            Some(json!((found - truth).abs())),
+        );
+        // In the order of the parameters the length is second.
+        let [low, high] =
+            [0, 1].map(|i| number(&format!("/identified/posterior/interval_90/1/{i}")));
+        let held = low <= Some(truth) && high >= Some(truth);
+        put("length_interval_held".to_owned(), Some(json!(held)));
+    }
+    let verdicts = [("", "/true_verdict"), ("camera_", "/camera_verdict")];
+    for (prefix, pointer) in verdicts {
+        put(
+            format!("{prefix}success"),
+            at(&format!("{pointer}/success")),
+        );
+        let conditions = at(&format!("{pointer}/conditions"));
+        for condition in conditions.iter().filter_map(Value::as_array).flatten() {
+            let name = condition["name"].as_str().unwrap_or_default();
+            put(
+                format!("{prefix}{}", name.replace(' ', "_")),
+                condition.get("met").cloned(),
+            );
+        }
+    }
+    // A camera that did not see all that it takes does not judge.
+    let unseen = at("/camera_verdict/unseen");
+    let judged = unseen.map(|unseen| unseen.as_array().is_some_and(Vec::is_empty));
+    let [truth, camera] = verdicts.map(|(_, verdict)| at(&format!("{verdict}/success")));
+    put("camera_judged".to_owned(), judged.map(Value::from));
+    if judged == Some(true) {
+        put("verdicts_agree".to_owned(), Some(json!(truth == camera)));
+    }
+    Value::Object(row)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_throw_its_end_its_misses_and_its_conditions_are_kept() {
+        let report = json!({
+            "ok": true, "wall_s": 40.0, "true_tip_target_distance_m": 0.25,
+            "stereo_tip_target_distance_m": 0.5, "score": {"interval_m": [0.3, 0.6]},
+            "truth": {"rope": {"length_m": 0.5}, "rope_touched_robot": false},
+            "identified": {"params": {"length_m": 0.75}, "posterior": {"interval_90": [[20, 22], [0.4, 0.8]]}},
+            "true_verdict": {"success": true, "conditions": [{"name": "domino down", "met": true}]},
+            "camera_verdict": {"success": false, "unseen": [], "conditions": [{"name": "domino down", "met": false}]},
+        });
+        let expected = json!({
+            "seed": 7, "ok": true, "wall_s": 40.0, "miss_m": 0.25, "camera_miss_m": 0.5,
+            "camera_error_m": 0.25, "camera_interval_held": false, "robot_touched": false,
+            "length_error_m": 0.25, "length_interval_held": true,
+            "success": true, "domino_down": true, "camera_success": false,
+            "camera_domino_down": false, "camera_judged": true, "verdicts_agree": false,
+        });
+        assert_eq!(throw(7, &report), expected);
+        let mut undecided = report;
+        undecided["camera_verdict"]["unseen"] = json!(["domino down"]);
+        let row = throw(7, &undecided);
+        assert_eq!(
+            (&row["camera_judged"], row.get("verdicts_agree")),
+            (&json!(false), None)
+        );
+        let stopped = json!({"ok": false, "error": "stopped", "true_verdict": null});
+        assert_eq!(
+            throw(8, &stopped),
+            json!({"seed": 8, "ok": false, "error": "stopped"})
+        );
+    }
+
+    #[test]
+    fn names_are_told_apart() {
+        for (i, study) in STUDIES.iter().enumerate() {
+            assert!(STUDIES[..i].iter().all(|other| other.name != study.name));
+        }
+    }
+}
