@@ -97,7 +97,7 @@ pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> O
     let known = known.into_iter();
     known
         .map(|known| (strsim::damerau_levenshtein(unknown, known), known))
-        .filter(|(edits, known)| *edits <= SLIP && *edits < known.len())
+        .filter(|(edits, known)| *edits <= SLIP && 2 * *edits <= known.len())
         .min()
         .map(|(_, known)| known)
 }

@@ -23,6 +23,18 @@ fn the_documents_say_what_the_records_give() {
     assert!(output.status.success(), "{}", said(&output));
 }
 
+/// Commits files in a folder.
+fn commit(folder: &Path, files: &str) {
+    let shell = format!(
+        "git add {files} && git -c user.name=a -c user.email=a@example.org commit -q -m one"
+    );
+    let made = Command::new("sh")
+        .args(["-c", &shell])
+        .current_dir(folder)
+        .status();
+    assert!(made.unwrap().success());
+}
+
 /// A folder with a commit, and a `wag` whose throw with an odd seed fails and that counts its runs.
 fn workplace() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
@@ -31,8 +43,8 @@ fn workplace() -> tempfile::TempDir {
         "wag",
         r#"#!/bin/sh
 echo run >>runs.txt
-seed="$5"
-mkdir -p "$7" && echo film >"$7/run.mcap"
+seed="$6"
+mkdir -p "$8" && echo film >"$8/run.mcap"
 if [ "$((seed % 2))" = 1 ]; then
   echo '{"ok": false, "error": "the rope is lost"}'
   exit 1
@@ -44,13 +56,13 @@ echo '{"ok": true, "true_tip_target_distance_m": 0.0025}'
         "README.md",
         "one\n<!-- figures\n{lob.ok.true} of {lob.n} throws, median {lob.miss_m.median:mm1} mm\n-->\n<!-- end of figures -->\n",
     );
-    let shell = "chmod +x wag && git init -q . && git add wag README.md && \
-        git -c user.name=a -c user.email=a@example.org commit -q -m one";
+    let shell = ["-c", "chmod +x wag && git init -q ."];
     let made = Command::new("sh")
-        .args(["-c", shell])
+        .args(shell)
         .current_dir(dir.path())
         .status();
     assert!(made.unwrap().success());
+    commit(dir.path(), "wag README.md");
     dir
 }
 
@@ -63,9 +75,8 @@ fn figures_are_made_once_from_seeds_of_the_commit_and_documents_are_held_to_them
             .lines()
             .count()
     };
-    let make =
-        |runs: u64| format!("make lob --json --out kept --records . --wag ./wag --runs {runs}");
-    let fill = |how: &str| figures(dir.path(), &format!("{how} README.md --records ."));
+    let make = |runs: u64| format!("make lob --json --out kept --wag ./wag --runs {runs}");
+    let fill = |how: &str| figures(dir.path(), &format!("{how} README.md"));
 
     let output = figures(dir.path(), &make(3));
     let report: Value = serde_json::from_slice(&output.stdout).expect("one object");
@@ -73,10 +84,12 @@ fn figures_are_made_once_from_seeds_of_the_commit_and_documents_are_held_to_them
     let failed = study["failed"].as_u64().unwrap();
     assert!(failed == 1 || failed == 2, "{report}");
     assert_eq!(runs(), 3);
+    // What was made may be committed: no program is built from it.
+    commit(dir.path(), "docs/figures");
     // More runs: those that are kept are not made again, and what failed can be looked into.
     assert!(figures(dir.path(), &make(4)).status.success());
     assert_eq!(runs(), 4);
-    let record = std::fs::read_to_string(dir.path().join("lob.jsonl")).unwrap();
+    let record = std::fs::read_to_string(dir.path().join("docs/figures/lob.jsonl")).unwrap();
     assert_eq!(record.matches("the rope is lost").count(), 2);
     let folders = std::fs::read_dir(dir.path().join("kept/lob")).unwrap();
     let folders = folders.filter(|entry| entry.as_ref().unwrap().path().is_dir());
@@ -111,7 +124,7 @@ fn changed_sources_another_program_and_unknown_studies_are_refused() {
         assert_eq!(output.status.code(), Some(2), "{line}: {}", said(&output));
         assert!(said(&output).contains(word), "{line}: {}", said(&output));
     };
-    let line = "make lob --out kept --records . --wag ./wag --runs 1";
+    let line = "make lob --out kept --wag ./wag --runs 1";
     refused(
         "make lobs --out kept",
         "no study `lobs`; there are strike, lob",
@@ -124,11 +137,6 @@ fn changed_sources_another_program_and_unknown_studies_are_refused() {
     let script = std::fs::read_to_string(dir.path().join("wag")).unwrap();
     std::fs::write(dir.path().join("wag"), script + "# changed\n").unwrap();
     refused(line, "commit first");
-    let shell = "git -c user.name=a -c user.email=a@example.org commit -q -a -m two";
-    let made = Command::new("sh")
-        .args(["-c", shell])
-        .current_dir(dir.path())
-        .status();
-    assert!(made.unwrap().success());
+    commit(dir.path(), "wag");
     refused(line, "name another folder with --out");
 }

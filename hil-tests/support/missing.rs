@@ -7,19 +7,25 @@
 
 use std::path::PathBuf;
 
-/// Says that a tool is missing: in CI, which installs all, that fails.
-pub fn tool(said: &str) {
-    assert!(std::env::var_os("CI").is_none(), "{said}");
+/// Says what a test is without: a failure in CI, and where `.ci/run` has installed it.
+pub fn without(said: &str) {
+    let must = ["CI", "WAG_REQUIRE_TOOLS"].map(std::env::var_os);
+    assert!(must.iter().all(Option::is_none), "{said}");
     println!("skipped: {said}");
 }
 
-/// What an environment variable names; [`tool`] where it names nothing.
+/// What an environment variable names; [`without`] it where it names nothing.
 pub fn named(variable: &str, what: &str) -> Option<std::ffi::OsString> {
     let value = std::env::var_os(variable);
     if value.is_none() {
-        tool(&format!("{variable} names no {what}"));
+        without(&format!("{variable} names no {what}"));
     }
     value
+}
+
+/// Whether no ONNX Runtime is named: there is nothing to test with.
+pub fn no_onnx_runtime() -> bool {
+    named("ORT_DYLIB_PATH", "ONNX Runtime library").is_none()
 }
 
 /// A file or folder of the reference data in `shared` beside the checkout. `WAG_REQUIRE_SHARED`

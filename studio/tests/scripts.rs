@@ -10,7 +10,7 @@ use std::process::Command;
 fn the_scripts_of_the_page_calculate_as_they_should() {
     let test = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scripts.js");
     let Ok(made) = Command::new("node").arg(test).output() else {
-        missing::tool("no node on this machine: the page's scripts were not run");
+        missing::without("no node on this machine: the page's scripts were not run");
         return;
     };
     let said = String::from_utf8_lossy(&made.stderr);

@@ -13,11 +13,6 @@ use shared_types::KeypointTrack;
 use std::path::Path;
 use support::{are_refused_in, json_in, missing, shared};
 
-/// Whether no ONNX Runtime is named: there is nothing to test with.
-fn no_runtime() -> bool {
-    missing::named("ORT_DYLIB_PATH", "ONNX Runtime library").is_none()
-}
-
 /// A folder with two trackers, another model, no model, and the wiggle's camera, which names
 /// a tracker.
 fn folder(wiggle: &Path) -> tempfile::TempDir {
@@ -54,7 +49,7 @@ fn track(wiggle: &Path, more: &str) -> String {
 
 #[test]
 fn the_report_tells_who_did_what() {
-    let Some(wiggle) = shared("data/wiggle/a1").filter(|_| !no_runtime()) else {
+    let Some(wiggle) = shared("data/wiggle/a1").filter(|_| !missing::no_onnx_runtime()) else {
         return;
     };
     let dir = folder(&wiggle);
@@ -94,7 +89,7 @@ fn the_report_tells_who_did_what() {
 
 #[test]
 fn what_does_not_fit_is_refused() {
-    let Some(wiggle) = shared("data/wiggle/a1").filter(|_| !no_runtime()) else {
+    let Some(wiggle) = shared("data/wiggle/a1").filter(|_| !missing::no_onnx_runtime()) else {
         return;
     };
     let dir = folder(&wiggle);

@@ -16,11 +16,6 @@ use onnx::Axis::{Is, Open};
 use onnx::{Axis, DOUBLE, FLOAT, Graph, steady};
 use recording::{Wiggle, missing, quantile};
 
-/// Whether no ONNX Runtime is named: there is nothing to test with.
-fn no_runtime() -> bool {
-    missing::named("ORT_DYLIB_PATH", "ONNX Runtime library").is_none()
-}
-
 /// Frames of a recording that are used.
 const SHORT: usize = 90;
 
@@ -50,7 +45,7 @@ fn grey(width_px: usize, height_px: usize, stamp_ns: u64) -> ImageFrame {
 
 #[test]
 fn chunks_join_where_the_points_are_seen_best() {
-    if no_runtime() {
+    if missing::no_onnx_runtime() {
         return;
     }
     let frames: Vec<ImageFrame> = (1..14).map(|stamp| grey(32, 16, stamp)).collect();
@@ -175,7 +170,7 @@ fn refused(bytes: &[u8], words: &[&str]) {
 
 #[test]
 fn files_that_do_not_fit_are_refused_with_what_is_wanted() {
-    if no_runtime() {
+    if missing::no_onnx_runtime() {
         return;
     }
     let missing = OnnxTracker::load(std::path::Path::new("none.onnx")).unwrap_err();
@@ -242,7 +237,7 @@ fn files_that_do_not_fit_are_refused_with_what_is_wanted() {
 
 #[test]
 fn an_answer_of_no_numbers_is_refused() {
-    if no_runtime() {
+    if missing::no_onnx_runtime() {
         return;
     }
     let frames = [grey(16, 8, 1), grey(16, 8, 2)];

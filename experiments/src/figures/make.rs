@@ -8,7 +8,7 @@ use crate::program::program_at;
 use anyhow::{Context, ensure};
 use cli_output::{Machine, OrInput, Outcome, Stage, is_interrupted};
 use run_log::files;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use shared_types::ipc::message::Progress;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -19,6 +19,8 @@ use std::time::SystemTime;
 
 /// Seeds kept for each study.
 const SEEDS: u64 = 1000;
+/// Exit code of a command whose line or files cannot be worked with.
+const BAD_INPUT: i32 = 2;
 
 /// The commit whose sources lie here, unchanged.
 pub fn commit() -> anyhow::Result<String> {
@@ -36,7 +38,10 @@ pub fn commit() -> anyhow::Result<String> {
         );
         Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
-    let changed = git(&["status", "--porcelain", "--untracked-files=no"])?;
+    // What is made here stands in documents, which no program is built from.
+    let built_from = ["--", ".", ":(exclude)docs", ":(exclude)*.md"];
+    let status = ["status", "--porcelain", "--untracked-files=no"];
+    let changed = git(&[&status[..], &built_from].concat())?;
     ensure!(
         changed.is_empty(),
         "the sources differ from their commit: figures say from which commit they are, so commit first"
@@ -45,8 +50,8 @@ pub fn commit() -> anyhow::Result<String> {
 }
 
 /// The first seed of the study in place `index`: from the hash of the commit, which nobody can
-/// choose, so that what is judged was not seen before. Even where a single one is asked for, since
-/// results whose seeds are odd are for tuning.
+/// pick, so that what is judged was not seen before. An even one for the results of `experiments`, whose
+/// odd seeds are for tuning.
 fn first_seed(commit: &str, index: usize, program: Program) -> anyhow::Result<u64> {
     let digits = commit.get(..7).context("the commit has no hash")?;
     let number = u64::from_str_radix(digits, 16).context("the commit has no hash")?;
@@ -91,7 +96,10 @@ pub fn make(args: &MakeFiguresArgs, study: &Study, commit: &str, index: usize) -
     };
     making.keep_source().or_input()?;
     let stage = Stage::begin(study.name);
-    let runs = args.runs.unwrap_or(study.runs);
+    let runs = match study.program {
+        Program::Experiments => study.runs,
+        Program::Wag | Program::WagBesideRig => args.runs.unwrap_or(study.runs),
+    };
     let mut rows = Vec::new();
     for run in 0..runs {
         let seed = making.source.first_seed + run;
@@ -125,17 +133,21 @@ pub fn make(args: &MakeFiguresArgs, study: &Study, commit: &str, index: usize) -
         path.display()
     ));
     Ok(json!({
-        "study": study.name, "runs": runs, "failed": failed, "record": path, "seconds": seconds,
+        "study": study.name, "runs": runs, "failed": failed,
+        "record": path.display().to_string(), "seconds": seconds,
     }))
 }
 
 /// As somebody would type it.
 fn command_line(study: &Study) -> String {
-    let program = match study.program {
-        Program::Wag | Program::WagBesideRig => "wag",
-        Program::Experiments => "experiments",
-    };
-    format!("{program} {} --seed SEED", study.args.join(" "))
+    let args = study.args.join(" ");
+    match study.program {
+        Program::Wag => format!("wag {args} --seed SEED"),
+        Program::WagBesideRig => format!(
+            "wag {args} --seed SEED --arm 127.0.0.1 --camera DOMAIN, in front of wag rig --rope random --camera DOMAIN --seed SEED"
+        ),
+        Program::Experiments => format!("experiments {args} --seed SEED"),
+    }
 }
 
 /// Another program of the same build.
@@ -159,8 +171,7 @@ fn today() -> String {
 impl Making<'_> {
     /// Writes down of what the reports in the folder are, or compares with what they are of.
     fn keep_source(&self) -> anyhow::Result<()> {
-        std::fs::create_dir_all(&self.folder)
-            .with_context(|| format!("cannot make `{}`", self.folder.display()))?;
+        files::create_folder(&self.folder)?;
         let path = self.folder.join("source.json");
         if !path.exists() {
             return files::write_json(&path, &self.source);
@@ -200,19 +211,36 @@ impl Making<'_> {
             stop.store(true, Ordering::Relaxed);
             output
         })?;
-        let mut report: Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|_| {
-            let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-            json!({"ok": false, "error": format!("{}: {said}", output.status)})
-        });
-        if !output.status.success() {
-            report["ok"] = json!(false);
+        let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        let last = said.lines().last().unwrap_or_default();
+        // Neither what was stopped with this program nor what could not begin tells anything.
+        let done = output.status.success();
+        ensure!(
+            done || !is_interrupted(),
+            "interrupted at seed {seed}; the same command goes on from there"
+        );
+        let is_thrown = self.study.program != Program::Experiments;
+        ensure!(
+            done || (is_thrown && output.status.code() != Some(BAD_INPUT)),
+            "{}, seed {seed}: {last}",
+            self.source.command
+        );
+        let mut report = match serde_json::from_slice(&output.stdout) {
+            Ok(Value::Object(report)) => report,
+            _ => Map::from_iter([(
+                "error".to_owned(),
+                json!(format!("{}: {last}", output.status)),
+            )]),
+        };
+        let ok = done && report.get("ok") == Some(&Value::Bool(true));
+        report.insert("ok".to_owned(), ok.into());
+        if let Some(Value::String(error)) = report.get_mut("error") {
+            *error = error.replace(&run.display().to_string(), "RUN");
         }
-        // A run that was stopped with this program tells nothing.
-        if !is_interrupted() {
-            files::write_json(&kept, &report)?;
-        }
+        let report = Value::Object(report);
+        files::write_json(&kept, &report)?;
         // What failed is looked into; a hundred recordings that nobody reads fill the disk.
-        if report["ok"] == true && self.study.program != Program::Experiments {
+        if ok && is_thrown {
             let _ = std::fs::remove_dir_all(&run);
         }
         Ok(report)

@@ -9,7 +9,7 @@ mod rig;
 mod study;
 mod template;
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 pub use args::FiguresCommand;
 use args::{FillFiguresArgs, MakeFiguresArgs};
 use cli_output::{OrInput, Outcome};
@@ -68,6 +68,9 @@ fn fill(args: &FillFiguresArgs, write: bool) -> Outcome<Option<Value>> {
         let (made, found) = template::fill(&document, &mut numbers)
             .with_context(name)
             .or_input()?;
+        if found == 0 {
+            return Err(bad_input!("{} has no block of figures", name()));
+        }
         blocks += found;
         if made == document {
             continue;
@@ -79,11 +82,6 @@ fn fill(args: &FillFiguresArgs, write: bool) -> Outcome<Option<Value>> {
             return Err(failed!("{}", difference(&name(), &document, &made)));
         }
     }
-    (|| {
-        ensure!(blocks > 0, "no block of figures in these documents");
-        Ok(())
-    })()
-    .or_input()?;
     println!("{blocks} blocks of figures are those of the records");
     let command = if write {
         "figures write"

@@ -34,7 +34,7 @@ fn spread(numbers: &[f64]) -> Value {
     let (low, high) = median_ranks(sorted.len());
     json!({
         "n": sorted.len(), "mean": mean(sorted.iter().copied()), "min": sorted.first(),
-        "median": at(0.5), "p95": at(0.95), "max": sorted.last(),
+        "median": f64::midpoint(sorted[(sorted.len() - 1) / 2], sorted[sorted.len() / 2]), "p95": at(0.95), "max": sorted.last(),
         "low": sorted[low], "high": sorted[high],
     })
 }

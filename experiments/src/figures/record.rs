@@ -1,9 +1,10 @@
 //! The record of a study: where its figures come from, then its rows, one JSON object a line.
 
-use anyhow::{Context, ensure};
+use super::study::{Program, STUDIES, Study};
+use anyhow::{Context, bail, ensure};
 use run_log::files;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Where figures come from.
@@ -13,17 +14,26 @@ pub struct Source {
     pub study: String,
     /// What was run, `SEED` for the seed.
     pub command: String,
-    /// Of the sources that the program was built from.
+    /// Of the sources where it was run; `program` tells whether it was built from them.
     pub commit: String,
     /// Version and hash of the program.
     pub program: String,
     /// Processor and its cores.
     pub machine: String,
-    /// Day (UTC) on which the last row was made.
+    /// Day (UTC) on which the record was written.
     pub day: String,
     pub first_seed: u64,
     /// Busy threads beside it.
     pub load: u16,
+}
+
+impl Source {
+    /// Whether the study is a result of `experiments`, not a run for each seed.
+    fn is_one_result(&self) -> bool {
+        let of_study = |study: &&Study| study.name == self.study;
+        let study = STUDIES.iter().find(of_study);
+        study.is_some_and(|study| study.program == Program::Experiments)
+    }
 }
 
 /// A study's figures.
@@ -58,6 +68,7 @@ impl Record {
         for row in &self.rows {
             text += &(serde_json::to_string(row)? + "\n");
         }
+        files::create_folder(folder)?;
         files::write_atomic(&path, text.as_bytes())?;
         Ok(path)
     }
@@ -65,17 +76,13 @@ impl Record {
     /// What the document may quote: the source's fields, those of the only row or what many add
     /// up to, by field.
     pub fn numbers(&self) -> anyhow::Result<Value> {
-        let mut all = match serde_json::to_value(&self.source)? {
-            Value::Object(fields) => fields,
-            _ => Map::new(),
+        let mut all = match (self.source.is_one_result(), &*self.rows) {
+            (true, [Value::Object(one)]) => one.clone(),
+            (true, rows) => bail!("`{}` has {} results", self.source.study, rows.len()),
+            (false, rows) => super::numbers::of_rows(rows),
         };
-        match &*self.rows {
-            [Value::Object(one)] => all.extend(one.clone()),
-            rows => {
-                let last = self.source.first_seed + rows.len() as u64 - 1;
-                all.insert("last_seed".to_owned(), json!(last));
-                all.extend(super::numbers::of_rows(rows));
-            }
+        if let Value::Object(source) = serde_json::to_value(&self.source)? {
+            all.extend(source);
         }
         Ok(Value::Object(all))
     }
@@ -84,6 +91,7 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     #[test]
     fn a_record_is_read_as_it_was_written_and_what_is_broken_is_named() {
@@ -104,10 +112,8 @@ mod tests {
         let path = record.write(dir.path()).unwrap();
         assert_eq!(Record::read(dir.path(), "strike").unwrap(), record);
         let numbers = record.numbers().unwrap();
-        assert_eq!(
-            (&numbers["last_seed"], &numbers["miss_m"]["max"]),
-            (&json!(8), &json!(0.3))
-        );
+        assert_eq!(numbers["n"], 2);
+        assert_eq!(numbers["miss_m"]["max"], 0.3);
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, text.replace("0.3", "much")).unwrap();
         let error = format!("{:#}", Record::read(dir.path(), "strike").unwrap_err());

@@ -20,38 +20,41 @@ impl Rig {
     pub fn start(wag: &Path, seed: u64) -> anyhow::Result<Self> {
         let domain = format!("figures-{}-{seed}", std::process::id());
         let seed = seed.to_string();
-        let mut process = Command::new(wag)
+        let process = Command::new(wag)
+            .args(["rig", "--json", "--rope", "random", "--seed", &seed])
+            .args(["--command-port", "0", "--report-ports", "0,0,0,0"])
             .args([
-                "rig",
-                "--json",
-                "--command-port",
-                "0",
-                "--report-ports",
-                "0,0,0,0",
+                "--camera",
+                &domain,
+                "--parent",
+                &std::process::id().to_string(),
             ])
-            .args(["--rope", "random", "--camera", &domain, "--seed", &seed])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
             .with_context(|| format!("cannot run `{}`", wag.display()))?;
-        let stdout = process.stdout.take().context("the rig has no output")?;
-        let mut objects = Deserializer::from_reader(stdout).into_iter();
-        let reported = objects.next().unwrap_or(Ok(Value::Null));
-        let reported = reported.context("the rig did not start")?;
-        Ok(Self {
+        let mut rig = Self {
             process,
-            reported,
+            reported: Value::Null,
             domain,
-        })
+        };
+        let stdout = rig.process.stdout.take().context("the rig has no output")?;
+        let mut objects = Deserializer::from_reader(stdout).into_iter();
+        rig.reported = objects.next().unwrap_or(Ok(Value::Null))?;
+        Ok(rig)
     }
 
     /// Arguments of a command for its arm and its camera.
     pub fn arguments(&self) -> anyhow::Result<Vec<String>> {
         let port = |pointer: &str| {
             let port = self.reported.pointer(pointer).and_then(Value::as_u64);
-            port.map(|p| p.to_string())
-                .with_context(|| anyhow!("the rig has no `{pointer}`: {}", self.reported))
+            port.map(|p| p.to_string()).with_context(|| {
+                anyhow!(
+                    "the rig did not start (`wag rig` says why): no `{pointer}` in {}",
+                    self.reported
+                )
+            })
         };
         let mut arguments = vec!["--arm".to_owned(), "127.0.0.1".to_owned()];
         for (name, pointer) in [

@@ -70,81 +70,79 @@ const fn once(name: &'static str, args: &'static [&'static str]) -> Study {
     }
 }
 
+/// What is kept of each throw by its place in the report of `wag demo` or `wag run`.
+const KEPT: [(&str, &str); 9] = [
+    ("ok", "/ok"),
+    ("error", "/error"),
+    ("miss_m", "/true_tip_target_distance_m"),
+    ("camera_miss_m", "/stereo_tip_target_distance_m"),
+    ("robot_touched", "/truth/rope_touched_robot"),
+    ("simulations", "/identified/simulations"),
+    ("identify_s", "/stages/identify_s"),
+    ("plan_s", "/stages/plan_s"),
+    ("wall_s", "/wall_s"),
+];
+
+/// What is measured, its truth, and its interval: the length is the second of the parameters.
+const MEASURED: [(&str, &str, &str, &str); 2] = [
+    (
+        "camera",
+        "/stereo_tip_target_distance_m",
+        "/true_tip_target_distance_m",
+        "/score/interval_m",
+    ),
+    (
+        "length",
+        "/identified/params/length_m",
+        "/truth/rope/length_m",
+        "/identified/posterior/interval_90/1",
+    ),
+];
+
 /// What is kept of a throw on the rig: how it ended, how far it was off by truth and by camera, the
-/// judgement of each condition, and what it cost. What a run does not have is left out.
+/// judgement of each condition, and what it cost. What a run does not have is left out; one that
+/// failed met no condition.
 pub fn throw(seed: u64, report: &Value) -> Value {
-    let at = |pointer: &str| report.pointer(pointer).filter(|v| !v.is_null()).cloned();
-    let number = |pointer: &str| at(pointer).and_then(|v| v.as_f64());
-    let mut row = Map::new();
-    row.insert("seed".to_owned(), json!(seed));
-    let mut put = |name: String, value: Option<Value>| {
-        if let Some(value) = value {
-            row.insert(name, value);
-        }
-    };
-    for (name, pointer) in [
-        ("ok", "/ok"),
-        ("error", "/error"),
-        ("miss_m", "/true_tip_target_distance_m"),
-        ("camera_miss_m", "/stereo_tip_target_distance_m"),
-        ("robot_touched", "/truth/rope_touched_robot"),
-        ("simulations", "/identified/simulations"),
-        ("identify_s", "/stages/identify_s"),
-        ("plan_s", "/stages/plan_s"),
-        ("wall_s", "/wall_s"),
-    ] {
-        put(name.to_owned(), at(pointer));
+    let at = |pointer: &str| report.pointer(pointer).filter(|v| !v.is_null());
+    let number = |pointer: &str| at(pointer).and_then(Value::as_f64);
+    let mut row = Map::from_iter([("seed".to_owned(), json!(seed))]);
+    for (name, pointer) in KEPT {
+        row.extend(at(pointer).map(|value| (name.to_owned(), value.clone())));
     }
-    let (truth, camera) = (
-        number("/true_tip_target_distance_m"),
-        number("/stereo_tip_target_distance_m"),
-    );
-    if let (Some(truth), Some(camera)) = (truth, camera) {
-        put(
-            "camera_error_m".to_owned(),
-            Some(json!((camera - truth).abs())),
-        );
-        let [low, high] = ["/score/interval_m/0", "/score/interval_m/1"].map(number);
-        let held = low <= Some(truth) && high >= Some(truth);
-        put("camera_interval_held".to_owned(), Some(json!(held)));
-    }
-    let length = (
-        number("/truth/rope/length_m"),
-        number("/identified/params/length_m"),
-    );
-    if let (Some(truth), Some(found)) = length {
-        put(
-            "length_error_m".to_owned(),
-            Some(json!((found - truth).abs())),
-        );
-        // In the order of the parameters the length is second.
-        let [low, high] =
-            [0, 1].map(|i| number(&format!("/identified/posterior/interval_90/1/{i}")));
-        let held = low <= Some(truth) && high >= Some(truth);
-        put("length_interval_held".to_owned(), Some(json!(held)));
+    for (name, found, truth, interval) in MEASURED {
+        let (Some(found), Some(truth)) = (number(found), number(truth)) else {
+            continue;
+        };
+        row.insert(format!("{name}_error_m"), json!((found - truth).abs()));
+        let [low, high] = [0, 1].map(|end| number(&format!("{interval}/{end}")));
+        let held = low
+            .zip(high)
+            .map(|(low, high)| low <= truth && truth <= high);
+        row.extend(held.map(|held| (format!("{name}_interval_held"), held.into())));
     }
     let verdicts = [("", "/true_verdict"), ("camera_", "/camera_verdict")];
-    for (prefix, pointer) in verdicts {
-        put(
-            format!("{prefix}success"),
-            at(&format!("{pointer}/success")),
-        );
-        let conditions = at(&format!("{pointer}/conditions"));
-        for condition in conditions.iter().filter_map(Value::as_array).flatten() {
+    for (prefix, verdict) in verdicts {
+        let success = at(&format!("{verdict}/success"));
+        row.extend(success.map(|value| (format!("{prefix}success"), value.clone())));
+        let conditions = at(&format!("{verdict}/conditions")).and_then(Value::as_array);
+        for condition in conditions.into_iter().flatten() {
             let name = condition["name"].as_str().unwrap_or_default();
-            put(
-                format!("{prefix}{}", name.replace(' ', "_")),
-                condition.get("met").cloned(),
-            );
+            let name = format!("{prefix}{}", name.replace(' ', "_"));
+            row.insert(name, condition["met"].clone());
+        }
+    }
+    if row.get("ok") != Some(&Value::Bool(true)) {
+        for name in ["success", "target_hit"] {
+            row.insert(name.to_owned(), false.into());
         }
     }
     // A camera that did not see all that it takes does not judge.
-    let unseen = at("/camera_verdict/unseen");
-    let judged = unseen.map(|unseen| unseen.as_array().is_some_and(Vec::is_empty));
-    let [truth, camera] = verdicts.map(|(_, verdict)| at(&format!("{verdict}/success")));
-    put("camera_judged".to_owned(), judged.map(Value::from));
-    if judged == Some(true) {
-        put("verdicts_agree".to_owned(), Some(json!(truth == camera)));
+    if let Some(unseen) = at("/camera_verdict/unseen").and_then(Value::as_array) {
+        row.insert("camera_judged".to_owned(), unseen.is_empty().into());
+        if unseen.is_empty() {
+            let [truth, camera] = verdicts.map(|(_, verdict)| at(&format!("{verdict}/success")));
+            row.insert("verdicts_agree".to_owned(), (truth == camera).into());
+        }
     }
     Value::Object(row)
 }
@@ -181,7 +179,9 @@ mod tests {
         let stopped = json!({"ok": false, "error": "stopped", "true_verdict": null});
         assert_eq!(
             throw(8, &stopped),
-            json!({"seed": 8, "ok": false, "error": "stopped"})
+            json!({
+                "seed": 8, "ok": false, "error": "stopped", "success": false, "target_hit": false,
+            })
         );
     }
 

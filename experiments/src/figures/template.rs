@@ -22,7 +22,9 @@ pub fn fill(
     let mut rest = document;
     let mut blocks = 0;
     while let Some((before, after)) = rest.split_once(BEGIN) {
-        let line = before.matches('\n').count() + made.matches('\n').count() + 1;
+        let line = document[..document.len() - after.len()]
+            .matches('\n')
+            .count();
         let fail = || format!("block of figures that begins in line {line}");
         let unended = || format!("has no `{}` or no `{END}`", BODY.trim());
         let split = after.split_once(BODY).and_then(|(template, body)| {

@@ -11,6 +11,7 @@ use tempfile::NamedTempFile;
 
 /// Links that lead to links that lead to links are followed this often.
 const LINKS_MAX: usize = 40;
+const NO_FOLDER: &str = "there is no such folder";
 /// Names of this program's own standard output.
 const STANDARD_OUTPUT: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
 
@@ -67,15 +68,18 @@ fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     tempfile::Builder::new()
         .permissions(PermissionsExt::from_mode(0o666))
         .tempfile_in(folder_of(path))
-        .map_err(|e| match e.kind() {
-            ErrorKind::NotFound => io::Error::other("there is no such folder"),
-            kind => kind.into(),
-        })
+        .map_err(|e| e.kind().into())
 }
 
 /// What a failure to write `path` is called.
 pub(crate) fn cannot_write(path: &Path) -> impl FnOnce(io::Error) -> anyhow::Error + '_ {
-    move |error| anyhow!("cannot write `{}`: {}", path.display(), why(&error))
+    move |error| {
+        let why = match error.kind() {
+            ErrorKind::NotFound => NO_FOLDER.to_owned(),
+            _ => why(&error),
+        };
+        anyhow!("cannot write `{}`: {why}", path.display())
+    }
 }
 
 /// Writes `bytes` to `path` so that a reader sees the old or the new file,
@@ -106,6 +110,11 @@ fn put(path: &Path, bytes: &[u8]) -> io::Result<()> {
             Ok(())
         }
     }
+}
+
+/// Makes a folder, and those above it, unless it is there.
+pub fn create_folder(path: &Path) -> Result<()> {
+    std::fs::create_dir_all(path).map_err(cannot_write(path))
 }
 
 /// Finds out before any work whether its result can be written to `path`.
@@ -172,7 +181,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         check_writable(&dir.path().join("new")).unwrap();
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
-        for (path, named) in [("", "directory"), ("none/a.csv", "none/a.csv")] {
+        for (path, named) in [("", "it is a folder"), ("none/a.csv", "none/a.csv")] {
             let error = check_writable(&dir.path().join(path)).unwrap_err();
             let said = format!("{error:#}");
             assert!(said.contains(named) && !said.contains("at path"), "{said}");

@@ -35,13 +35,20 @@ mod tests {
         for name in [
             "planer.toml",
             "planner.toml",
+            "demo.toml",
             "camera.conf",
             "notes.toml",
             "lmits.toml",
         ] {
             std::fs::write(dir.path().join(name), "").unwrap();
         }
-        let read = ["planner.toml", "limits.toml", "camera.toml", "rt.toml"];
+        let read = [
+            "planner.toml",
+            "limits.toml",
+            "camera.toml",
+            "cell.toml",
+            "rig.toml",
+        ];
         let found = misnamed(dir.path(), &read);
         let expected = [
             ("lmits.toml", "limits.toml"),

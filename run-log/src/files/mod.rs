@@ -9,7 +9,7 @@ mod rope;
 mod text;
 
 pub(crate) use atomic::cannot_write;
-pub use atomic::{check_writable, write_atomic, write_json};
+pub use atomic::{check_writable, create_folder, write_atomic, write_json};
 pub use misnamed::misnamed;
 pub use motion::{JointsCsv, read_joints, read_pose, read_table, write_joints, write_trajectory};
 pub use rope::{read_posterior, read_rope, read_unconfirmed, write_new_rope, write_rope_estimate};

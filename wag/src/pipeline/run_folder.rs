@@ -26,7 +26,7 @@ impl RunFolder {
         for folder in ["config", "log"] {
             let refused = |e| {
                 let (path, why) = (path.display(), why(&e));
-                bad_input!("cannot create run folder `{path}`: {why}; --out names another")
+                bad_input!("cannot create run folder `{path}` (--out): {why}")
             };
             std::fs::create_dir_all(path.join(folder)).map_err(refused)?;
         }

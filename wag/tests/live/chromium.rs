@@ -49,7 +49,7 @@ impl Chromium {
     /// standard error, where there is none. In CI there must be one.
     pub(crate) fn start() -> Option<Self> {
         let Some(program) = program() else {
-            missing::tool("no chromium (PATH, WAG_CHROMIUM): the page was not looked at");
+            missing::without("no chromium (PATH, WAG_CHROMIUM): the page was not looked at");
             return None;
         };
         let folder = tempfile::tempdir().unwrap();
