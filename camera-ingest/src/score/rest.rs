@@ -3,9 +3,11 @@
 //! A tip that lies still for most of the film would be taken for the scene behind it: the scene
 //! is what the film's first frames show, in which the rope still hangs. The domino is known by
 //! its pixels there: as long as it stands, they keep its colour. It has fallen where they have
-//! lost it and others beside them have it instead: one that something covers is not fallen.
+//! lost it and others beside them have it instead: one that something covers is not fallen. As a
+//! lead may come to lie on what it felled, that is asked all through the film: a domino that has
+//! fallen stays down, and one that stands must be seen standing at the end.
 
-use super::blob::{Chroma, chroma_of_rgb, coverage};
+use super::blob::{chroma_of_rgb, coverage};
 use super::path::{LocalPath, mark_small};
 use super::scene::{Scene, blob_error, read_sized};
 use super::{MIN_DETECTIONS, ScoreError, check_colour};
@@ -15,9 +17,10 @@ use nalgebra::Vector3;
 use shared_types::ipc::message::{DominoLook, SeenThrow};
 use shared_types::{MonotonicNs, StereoCamera};
 
-/// Frames before the throw moves anything, and frames after it has come to rest.
+/// Frames before the throw moves anything.
 const FIRST_FRAMES: usize = 9;
-const LAST_FRAMES: usize = 15;
+/// Frames in whose median the domino is looked for.
+const DOMINO_FRAMES: usize = 15;
 /// Around the domino's projection: what a calibration is off by, and more (px).
 const WINDOW_PX: f64 = 22.0;
 /// Coverage from which a sample shows the domino.
@@ -42,10 +45,10 @@ pub fn look(
     from_ns: u64,
 ) -> Result<SeenThrow, ScoreError> {
     let frames = source.len();
-    if frames < FIRST_FRAMES + LAST_FRAMES {
+    if frames < FIRST_FRAMES + DOMINO_FRAMES {
         return Err(ScoreError::Input(format!(
             "the film has {frames} frames, at least {} are needed",
-            FIRST_FRAMES + LAST_FRAMES
+            FIRST_FRAMES + DOMINO_FRAMES
         )));
     }
     check_colour("tip", tip_rgb)?;
@@ -54,7 +57,7 @@ pub fn look(
     let first: Vec<usize> = (0..FIRST_FRAMES).collect();
     let scene = Scene::of_frames(source, camera, &first)?;
     let (mut detections, mut end_s) = (Vec::new(), 0.0);
-    let mut last = Vec::new();
+    let (mut shown, mut fell) = (Vec::new(), None);
     for index in 0..frames {
         let frame = read_sized(source, index, camera)?;
         let since_s = MonotonicNs(frame.0.stamp_ns).since_s(MonotonicNs(from_ns));
@@ -62,8 +65,12 @@ pub fn look(
         let near = detections.last().copied();
         let images = [&frame.left(), &frame.right()];
         detections.extend(scene.tip(images, tip_rgb, None, near, since_s));
-        if index + LAST_FRAMES >= frames {
-            last.push(frame);
+        shown.push(frame);
+        // The last of these medians ends with the film.
+        if (frames - 1 - index).is_multiple_of(DOMINO_FRAMES) {
+            let now = domino.and_then(|domino| has_fallen(&scene, camera, domino, &shown));
+            fell = now.or(fell.filter(|fell| *fell));
+            shown.clear();
         }
     }
     if detections.len() < MIN_DETECTIONS {
@@ -78,7 +85,6 @@ pub fn look(
     let paths = (0..detections.len())
         .filter_map(|index| LocalPath::around(&detections, index, blob_error(camera)));
     let tip = paths.map(|path| (path.t_s, to_world(path.at(path.t_s)).into()));
-    let fell = domino.and_then(|domino| has_fallen(&scene, camera, domino, &last));
     Ok(SeenThrow {
         end_s,
         tip: tip.collect(),
@@ -92,22 +98,25 @@ fn has_fallen(
     scene: &Scene<'_>,
     camera: &StereoCamera,
     domino: &DominoLook,
-    last: &[StereoFrame],
+    shown: &[StereoFrame],
 ) -> Option<bool> {
     let wanted = chroma_of_rgb(domino.rgb);
     let eyes: [fn(&StereoFrame) -> ImageFrame; 2] = [StereoFrame::left, StereoFrame::right];
     let (mut seen, mut kept, mut beside) = (0_usize, 0_usize, 0_usize);
     for (k, (of, image)) in eyes.iter().zip(&scene.images).enumerate() {
-        let frames: Vec<_> = last.iter().map(of).collect();
-        let now = crate::track::median_frame(&frames);
-        let middle = scene.middles[k];
-        let covers = |frame: &ImageFrame, at: usize, colour: Chroma| {
-            let sample = [frame.cb[at], frame.cr[at]].map(|c| f64::from(c) - 128.0);
-            coverage(sample, middle, colour) > COVERED
+        let frames: Vec<_> = shown.iter().map(of).collect();
+        let covers = |cb: u8, cr: u8| {
+            let sample = [cb, cr].map(|c| f64::from(c) - 128.0);
+            coverage(sample, scene.middles[k], wanted) > COVERED
+        };
+        let median = |plane: fn(&ImageFrame) -> &[u8], at: usize| {
+            let mut values: Vec<u8> = frames.iter().map(|frame| plane(frame)[at]).collect();
+            let middle = values.len() / 2;
+            *values.select_nth_unstable(middle).1
         };
         for at in window(camera, k, domino, image)? {
-            let is_there = covers(&now, at, wanted);
-            if covers(image, at, wanted) {
+            let is_there = covers(median(|f| &f.cb, at), median(|f| &f.cr, at));
+            if covers(image.cb[at], image.cr[at]) {
                 seen += 1;
                 kept += usize::from(is_there);
             } else {

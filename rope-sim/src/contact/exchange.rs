@@ -147,7 +147,7 @@ impl<V: Lanes> Contacts<V> {
         let yielding = match &self.domino {
             Some(domino) if body.rocks => {
                 touch.keep_where(domino.standing());
-                Some(domino.mobility(touch.normal(), touch.place(node)))
+                Some(domino.yielding(touch.normal(), touch.place(node)))
             }
             _ => None,
         };

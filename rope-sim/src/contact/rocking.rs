@@ -5,11 +5,12 @@
 //! it leans on, gravity and the rope's push make `I tilt'' = M_rope - m g rho
 //! sin(alpha - |tilt|)`, with inertia `I = m (t² + h²) / 3`, distance `rho` from edge to
 //! centre and critical tilt `alpha = atan(t / h)`; landing on the foot is inelastic.
-//! The rope feels a body that yields: contact stiffness and the domino's mobility are
-//! in series. Simultaneous contacts share the mobility.
+//! The rope feels a body that yields, to pushes and to friction: contact and domino are
+//! solved for together. Simultaneous contacts share the mobility.
 
 use super::body::{Body, Frame, constant};
 use super::summary::StepEnd;
+use super::touch::Yielding;
 use crate::algebra::Vec3;
 use crate::kernel::GRAVITY_M_S2;
 use crate::lanes::Lanes;
@@ -137,16 +138,19 @@ impl<V: Lanes> RockingBlocks<V> {
         self.forward.scale_add(half_t, self.foot)
     }
 
-    /// Acceleration along `normal` per force of a point at `x`, with its share of the
-    /// contacts (1/kg).
+    /// How it yields to a push against `normal` at `x`.
     #[inline(always)]
-    pub(crate) fn mobility(&self, normal: Vec3<V>, x: Vec3<V>) -> V {
+    pub(crate) fn yielding(&self, normal: Vec3<V>, x: Vec3<V>) -> Yielding<V> {
+        let (half, one) = (V::splat(0.5), V::splat(1.0));
         // Standing, it will lean away from the push.
         let away = V::splat(-1.0).flip_by(normal.dot(self.forward));
-        let leaning = V::select_less(V::splat(0.5), self.lean.abs(), self.lean, away);
+        let leaning = V::select_less(half, self.lean.abs(), self.lean, away);
         let arm = x.sub(self.edge(leaning));
-        let lever = normal.dot(self.axis.cross_add(arm, Vec3::zero()));
-        lever * lever * self.contacts * V::splat(1.0 / self.inertia_kg_m2())
+        Yielding {
+            lever: self.axis.cross_add(arm, Vec3::zero()).scale(leaning),
+            mobility: self.contacts * V::splat(1.0 / self.inertia_kg_m2()),
+            one_sided: one - self.lean.abs(),
+        }
     }
 
     /// Takes in the force on the rope (N) at `x`.

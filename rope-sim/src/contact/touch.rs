@@ -12,8 +12,9 @@
 //! first meets it; the path is followed from outside in strides of the distance left.
 //!
 //! Friction is a spring along the surface, anchored where the point began to stick,
-//! whose force is cut to the friction coefficient times the last normal force, and
-//! whose anchor is then dragged along: at rest it does not creep.
+//! whose force is cut to the friction coefficient times the normal force of the step
+//! before, and whose anchor is then dragged along: at rest it does not creep. It acts for
+//! a step longer than the contact pushes, so that an impact loses none of its friction.
 
 use super::body::Body;
 use super::nodes::Node;
@@ -58,8 +59,25 @@ pub(crate) struct Touch<V> {
     velocity: Vec3<V>,
     /// Stiffness where the contact is active, else 0 (N/m).
     stiffness: V,
-    /// Part of the force left where the obstacle yields (1).
-    share: V,
+    /// Stiffness along the surface, active or not (N/m).
+    along: V,
+    /// Force on the rope while it moves as predicted (N), and by how much less it is per
+    /// acceleration beyond that (kg).
+    push: Vec3<V>,
+    resistance: Sym3<V>,
+}
+
+/// How an obstacle that turns about an axis yields to a force on its surface.
+#[derive(Clone, Copy)]
+pub(crate) struct Yielding<V> {
+    /// Velocity of the place that is pushed, per rate of the turn that the obstacle is free to
+    /// make (m).
+    pub(crate) lever: Vec3<V>,
+    /// Inverse of the inertia about the axis, with the place's share of all contacts
+    /// (1/(kg m²)).
+    pub(crate) mobility: V,
+    /// Positive where it can turn in that sense only.
+    pub(crate) one_sided: V,
 }
 
 /// What a contact point is part of.
@@ -87,7 +105,9 @@ impl<V: Lanes> Touch<V> {
             gap: zero,
             velocity: none,
             stiffness: zero,
-            share: V::splat(1.0),
+            along: zero,
+            push: none,
+            resistance: Sym3::diagonal(zero),
         }
     }
 
@@ -140,16 +160,17 @@ impl<V: Lanes> Touch<V> {
         let ahead = rate.fma(tau, gap);
         let stiffness = V::select_less(zero, point.may_touch, point.stiffness, zero);
         self.stiffness = V::select_less(ahead, zero, stiffness, zero);
-        self.share = one;
+        self.along = stiffness * V::splat(TANGENTIAL_PART);
+        (self.push, self.resistance) = (Vec3::zero(), Sym3::diagonal(zero));
         let later = rate.fma(tau + h + h, gap);
         let imminent = V::select_less(later, V::splat(IMMINENT_M), one, zero);
         V::select_less(zero, point.may_touch, imminent, zero)
     }
 
-    /// Whether it pushes in any lane.
+    /// Whether it pushes or rubs in any lane.
     #[inline(always)]
     pub(crate) fn is_active(&self) -> bool {
-        V::any_less(V::splat(0.0), self.stiffness)
+        V::any_less(V::splat(0.0), self.stiffness.max(self.force))
     }
 
     /// The force on the link, as the step needs it.
@@ -160,35 +181,48 @@ impl<V: Lanes> Touch<V> {
         node: &Node<V>,
         al: Vec3<V>,
         scheme: &Scheme<V>,
-        yielding: Option<V>,
+        yielding: Option<Yielding<V>>,
     ) -> Load<V> {
-        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let one = V::splat(1.0);
         let (h, tau) = (scheme.h, retardation(scheme.h));
         let n = self.normal;
         let rate = n.dot(self.velocity);
         let shift = scheme.correct_half_phi + scheme.correct_half_phi;
         let normal_resistance = self.stiffness * scheme.correct_w.fma(tau, shift);
-        if let Some(mobility) = yielding {
-            self.share = normal_resistance.fma(mobility, one).recip();
-        }
-        let normal_resistance = normal_resistance * self.share;
-        let push = -(self.stiffness * self.share) * rate.fma(tau, self.gap);
+        let push = -self.stiffness * rate.fma(tau, self.gap);
 
         let slide = n.scale_sub(rate, self.velocity);
         let stretch = self.stretch;
         let stretch = n.scale_sub(n.dot(stretch), stretch);
-        let along = self.stiffness * V::splat(TANGENTIAL_PART);
+        let along = self.along;
         let pull = slide.scale_add(h + tau, stretch).scale(along);
         let limit = friction * self.force;
         let grip = (limit * pull.norm().max(V::splat(TINY)).recip()).min(one);
-        let grip = V::select_less(zero, self.stiffness, grip, zero);
         let tangential_resistance = grip * along * scheme.correct_w * (h + tau);
 
-        let force = n.scale_add(push, pull.scale(-grip));
-        let resistance = Sym3::diagonal(tangential_resistance)
+        self.push = n.scale_add(push, pull.scale(-grip));
+        self.resistance = Sym3::diagonal(tangential_resistance)
             .plus_outer(normal_resistance - tangential_resistance, n);
+        if let Some(yielding) = yielding {
+            self.yield_as(&yielding, scheme);
+        }
         let arm = self.surface.add(node.span.scale(-self.back));
-        Load::push(force, resistance, arm, al.cross_add(arm, node.a))
+        Load::push(self.push, self.resistance, arm, al.cross_add(arm, node.a))
+    }
+
+    /// The obstacle gives way within the step, along the surface as well as across it: its turn
+    /// is one more unknown, which Sherman and Morrison's formula eliminates.
+    #[inline(always)]
+    fn yield_as(&mut self, yielding: &Yielding<V>, scheme: &Scheme<V>) {
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let turning = -yielding.lever.dot(self.push);
+        let blocked = V::select_less(zero, turning, zero, yielding.one_sided);
+        let mobility = yielding.mobility * scheme.h * scheme.correct_w.recip();
+        let mobility = V::select_less(zero, blocked, zero, mobility);
+        let resisted = self.resistance.times_add(yielding.lever, Vec3::zero());
+        let part = mobility * yielding.lever.dot(resisted).fma(mobility, one).recip();
+        self.push = resisted.scale_add(part * turning, self.push);
+        self.resistance = self.resistance.plus_outer(-part, resisted);
     }
 
     /// Takes in the motion the step has given: normal force, anchor. Gives the force
@@ -207,23 +241,23 @@ impl<V: Lanes> Touch<V> {
         let arm = self.surface.add(node.span.scale(-self.back));
         let x = node.x.add(arm);
         let v = w.cross_add(arm, node.v).sub(body.frame.velocity_at(x));
-        let rate = n.dot(v);
-        let change = rate - n.dot(self.velocity);
-        let shift = scheme.correct_half_phi + scheme.correct_half_phi;
-        self.gap = (shift * scheme.correct_w.recip()).fma(change, self.gap);
-        let force = -(self.stiffness * self.share) * rate.fma(retardation(h), self.gap);
-        self.force = V::select_less(zero, self.stiffness, force.max(zero), zero);
+        let beyond = v.sub(self.velocity).scale(-scheme.correct_w.recip());
+        let on_rope = self.resistance.times_add(beyond, self.push);
+        let force = n.dot(on_rope).max(zero);
+        self.force = V::select_less(zero, self.stiffness, force, zero);
 
-        let slide = n.scale_sub(rate, v);
+        let slide = n.scale_sub(n.dot(v), v);
         let stretch = n.scale_sub(n.dot(self.stretch), self.stretch);
         let stretch = slide.scale_add(h, stretch);
-        let along = self.stiffness * V::splat(TANGENTIAL_PART);
+        let along = self.along;
         let pull = along * stretch.norm();
         let limit = body.friction * self.force;
         let grip = (limit * pull.max(V::splat(TINY)).recip()).min(V::splat(1.0));
         self.stretch = Vec3::select_less(zero, self.force, stretch.scale(grip), Vec3::zero());
-        let on_rope = n.scale_add(self.force, self.stretch.scale(-along));
-        (on_rope, x)
+        (
+            Vec3::select_less(zero, self.force, on_rope, Vec3::zero()),
+            x,
+        )
     }
 
     /// Lets the contact be where `standing` is positive only.

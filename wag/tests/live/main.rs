@@ -8,6 +8,7 @@ mod client;
 mod fake;
 mod preview;
 mod server;
+mod stop;
 mod studio;
 #[path = "../support/mod.rs"]
 mod support;
