@@ -35,9 +35,29 @@ pub fn trial_rope(seed: u64, index: u64) -> RopeParams {
     random_rope(TRIAL_SALT ^ (seed << 32) ^ index)
 }
 
-/// A rope no network was trained on: by turns one like a chain (slack, hardly damped, a
-/// few long heavy links, a light lead) and one of the ranges with its length, its
-/// stiffness, its damping or its lead's mass far beyond them.
+/// Kinds of [`outside_rope`]: slack, hardly damped, a few long heavy links, a light lead; or of the
+/// ranges but for one number far beyond them.
+pub const OUTSIDE_KINDS: [&str; 5] = [
+    "like a chain",
+    "longer",
+    "shorter",
+    "stiffer",
+    "heavier lead",
+];
+
+/// Which of [`OUTSIDE_KINDS`] a rope is of.
+#[must_use]
+pub fn outside_kind(index: u64) -> usize {
+    match index % 8 {
+        1 => 1,
+        3 => 2,
+        5 => 3,
+        7 => 4,
+        _ => 0,
+    }
+}
+
+/// A rope no network was trained on, see [`OUTSIDE_KINDS`]: every other one is like a chain.
 #[must_use]
 pub fn outside_rope(seed: u64, index: u64) -> RopeParams {
     let mut rng = ChaCha12Rng::seed_from_u64(TRIAL_SALT ^ 0x000d_0000 ^ (seed << 32) ^ index);
@@ -48,8 +68,8 @@ pub fn outside_rope(seed: u64, index: u64) -> RopeParams {
         if up { end * factor } else { end / factor }
     };
     let mass = rope.mass_per_length_kg_per_m;
-    match index % 8 {
-        0 | 2 | 4 | 6 => {
+    match outside_kind(index) {
+        0 => {
             rope.links = 12;
             rope.mass_per_length_kg_per_m = beyond(0.12, true);
             rope.joint_stiffness_nm_per_rad = beyond(0.004, false);
@@ -57,9 +77,9 @@ pub fn outside_rope(seed: u64, index: u64) -> RopeParams {
             rope.lead_mass_kg = beyond(0.02, false);
         }
         1 => rope.length_m = 0.65 + (beyond(0.08, true) - 0.08),
-        3 => rope.length_m = 0.45 - (beyond(0.05, true) - 0.05),
+        2 => rope.length_m = 0.45 - (beyond(0.05, true) - 0.05),
         // Ratios count, not values: the ends are those of the ratios to the mass.
-        5 => rope.joint_stiffness_nm_per_rad = beyond(mass / 0.02, true),
+        3 => rope.joint_stiffness_nm_per_rad = beyond(mass / 0.02, true),
         _ => rope.lead_mass_kg = beyond(6.0 * mass, true),
     }
     rope

@@ -4,23 +4,25 @@
 //! is what the film's first frames show, in which the rope still hangs. The domino is known by
 //! its pixels there: as long as it stands, they keep its colour. It has fallen where they have
 //! lost it and others beside them have it instead: one that something covers is not fallen. As a
-//! lead may come to lie on what it felled, that is asked all through the film: a domino that has
-//! fallen stays down, and one that stands must be seen standing at the end.
+//! lead may come to lie on what it felled, that is asked all through the film, and the last frames
+//! that show it decide; but one that was last seen standing, and not at the end, may have fallen.
 
 use super::blob::{chroma_of_rgb, coverage};
 use super::path::{LocalPath, mark_small};
 use super::scene::{Scene, blob_error, read_sized};
 use super::{MIN_DETECTIONS, ScoreError, check_colour};
-use crate::frame::{ImageFrame, StereoFrame};
+use crate::frame::ImageFrame;
 use crate::source::StereoSource;
 use nalgebra::Vector3;
 use shared_types::ipc::message::{DominoLook, SeenThrow};
 use shared_types::{MonotonicNs, StereoCamera};
+use std::collections::VecDeque;
 
 /// Frames before the throw moves anything.
 const FIRST_FRAMES: usize = 9;
-/// Frames in whose median the domino is looked for.
+/// Frames in whose median the domino is looked for, and from one look to the next.
 const DOMINO_FRAMES: usize = 15;
+const DOMINO_EVERY: usize = 5;
 /// Around the domino's projection: what a calibration is off by, and more (px).
 const WINDOW_PX: f64 = 22.0;
 /// Coverage from which a sample shows the domino.
@@ -57,20 +59,24 @@ pub fn look(
     let first: Vec<usize> = (0..FIRST_FRAMES).collect();
     let scene = Scene::of_frames(source, camera, &first)?;
     let (mut detections, mut end_s) = (Vec::new(), 0.0);
-    let (mut shown, mut fell) = (Vec::new(), None);
+    let (mut shown, mut fell) = (VecDeque::new(), None);
     for index in 0..frames {
         let frame = read_sized(source, index, camera)?;
         let since_s = MonotonicNs(frame.0.stamp_ns).since_s(MonotonicNs(from_ns));
         end_s = since_s;
         let near = detections.last().copied();
-        let images = [&frame.left(), &frame.right()];
-        detections.extend(scene.tip(images, tip_rgb, None, near, since_s));
-        shown.push(frame);
-        // The last of these medians ends with the film.
-        if (frames - 1 - index).is_multiple_of(DOMINO_FRAMES) {
-            let now = domino.and_then(|domino| has_fallen(&scene, camera, domino, &shown));
+        let images = [frame.left(), frame.right()];
+        let both = [&images[0], &images[1]];
+        detections.extend(scene.tip(both, tip_rgb, None, near, since_s));
+        let Some(domino) = domino else { continue };
+        shown.push_back(images);
+        if shown.len() > DOMINO_FRAMES {
+            shown.pop_front();
+        }
+        // The last look ends with the film.
+        if shown.len() == DOMINO_FRAMES && (frames - 1 - index).is_multiple_of(DOMINO_EVERY) {
+            let now = has_fallen(&scene, camera, domino, &shown);
             fell = now.or(fell.filter(|fell| *fell));
-            shown.clear();
         }
     }
     if detections.len() < MIN_DETECTIONS {
@@ -98,19 +104,17 @@ fn has_fallen(
     scene: &Scene<'_>,
     camera: &StereoCamera,
     domino: &DominoLook,
-    shown: &[StereoFrame],
+    shown: &VecDeque<[ImageFrame; 2]>,
 ) -> Option<bool> {
     let wanted = chroma_of_rgb(domino.rgb);
-    let eyes: [fn(&StereoFrame) -> ImageFrame; 2] = [StereoFrame::left, StereoFrame::right];
     let (mut seen, mut kept, mut beside) = (0_usize, 0_usize, 0_usize);
-    for (k, (of, image)) in eyes.iter().zip(&scene.images).enumerate() {
-        let frames: Vec<_> = shown.iter().map(of).collect();
+    for (k, image) in scene.images.iter().enumerate() {
         let covers = |cb: u8, cr: u8| {
             let sample = [cb, cr].map(|c| f64::from(c) - 128.0);
             coverage(sample, scene.middles[k], wanted) > COVERED
         };
         let median = |plane: fn(&ImageFrame) -> &[u8], at: usize| {
-            let mut values: Vec<u8> = frames.iter().map(|frame| plane(frame)[at]).collect();
+            let mut values: Vec<u8> = shown.iter().map(|images| plane(&images[k])[at]).collect();
             let middle = values.len() / 2;
             *values.select_nth_unstable(middle).1
         };

@@ -7,8 +7,31 @@ use super::experiment::Experiment;
 use super::picture::Curve;
 use cli_output::Outcome;
 use experiments::trials::{Trial, area_under_curve, mean};
-use planner::ropes::{outside_rope, trial_rope};
+use planner::ropes::{OUTSIDE_KINDS, outside_kind, outside_rope, trial_rope};
+use serde::Serialize;
 use serde_json::{Value, json};
+
+/// How many ropes of one kind were noticed.
+#[derive(Debug, Serialize)]
+struct Noticed {
+    kind: &'static str,
+    ropes: usize,
+    found: usize,
+}
+
+fn noticed(outside: &[Trial]) -> Vec<Noticed> {
+    let of = |(number, kind)| {
+        let own = outside
+            .iter()
+            .filter(|t| outside_kind(t.index / 2) == number);
+        Noticed {
+            kind,
+            ropes: own.clone().count(),
+            found: own.filter(|t| t.flagged).count(),
+        }
+    };
+    OUTSIDE_KINDS.into_iter().enumerate().map(of).collect()
+}
 
 /// Fraction of some trials flagged as out of distribution.
 fn flagged(trials: &[Trial]) -> f64 {
@@ -50,6 +73,7 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let own = json!({
         "ropes_inside": inside.len(), "ropes_outside": outside.len(),
         "area_under_curve": area, "found": found, "false_alarms": false_alarms,
+        "kinds": noticed(&outside),
     });
     experiment.finish(&all, picture, own, || {
         println!(
@@ -59,5 +83,8 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
             100.0 * found,
             100.0 * false_alarms
         );
+        for Noticed { kind, ropes, found } in noticed(&outside) {
+            println!("{kind}: {found} of {ropes} found");
+        }
     })
 }

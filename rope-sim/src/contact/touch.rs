@@ -14,7 +14,7 @@
 //! Friction is a spring along the surface, anchored where the point began to stick,
 //! whose force is cut to the friction coefficient times the normal force of the step
 //! before, and whose anchor is then dragged along: at rest it does not creep. It acts for
-//! a step longer than the contact pushes, so that an impact loses none of its friction.
+//! a step longer than the contact pushes, so that a short impact has friction, too.
 
 use super::body::Body;
 use super::nodes::Node;
@@ -226,7 +226,8 @@ impl<V: Lanes> Touch<V> {
     }
 
     /// Takes in the motion the step has given: normal force, anchor. Gives the force
-    /// on the rope (N) and where it acts, relative to the clock's origin (m).
+    /// on the rope (N) and where it acts, relative to the clock's origin (m). A pull, which
+    /// the step may have solved for where the point leaves, is not passed on.
     #[inline(always)]
     pub(crate) fn settle(
         &mut self,
@@ -244,7 +245,11 @@ impl<V: Lanes> Touch<V> {
         let beyond = v.sub(self.velocity).scale(-scheme.correct_w.recip());
         let on_rope = self.resistance.times_add(beyond, self.push);
         let force = n.dot(on_rope).max(zero);
+        // Where it pushes no longer, it may have rubbed for one more step.
+        let rubbed = V::select_less(zero, self.stiffness, zero, self.force);
         self.force = V::select_less(zero, self.stiffness, force, zero);
+        let acted = self.force.max(rubbed);
+        let on_rope = Vec3::select_less(zero, acted, on_rope, Vec3::zero());
 
         let slide = n.scale_sub(n.dot(v), v);
         let stretch = n.scale_sub(n.dot(self.stretch), self.stretch);
@@ -254,10 +259,7 @@ impl<V: Lanes> Touch<V> {
         let limit = body.friction * self.force;
         let grip = (limit * pull.max(V::splat(TINY)).recip()).min(V::splat(1.0));
         self.stretch = Vec3::select_less(zero, self.force, stretch.scale(grip), Vec3::zero());
-        (
-            Vec3::select_less(zero, self.force, on_rope, Vec3::zero()),
-            x,
-        )
+        (on_rope, x)
     }
 
     /// Lets the contact be where `standing` is positive only.
@@ -265,6 +267,7 @@ impl<V: Lanes> Touch<V> {
     pub(crate) fn keep_where(&mut self, standing: V) {
         let zero = V::splat(0.0);
         self.stiffness = V::select_less(zero, standing, self.stiffness, zero);
+        self.along = V::select_less(zero, standing, self.along, zero);
     }
 
     /// Where on the rope's surface it is, relative to the clock's origin (m).

@@ -25,7 +25,7 @@ pub use facts::domain_of_run;
 pub use http::Reply;
 pub use page::{IDS, script, style};
 
-use crate::report::{arm_points, tenths_mm};
+use crate::report::{REPORT, arm_points, headline_of, tenths_mm};
 use ask::{Ask, Open, Requested, hand_over};
 use attached::{Attached, Seen, newest_domain};
 use camera_ingest::preview::PreviewConfig;
@@ -70,8 +70,26 @@ struct Shown {
     rope: Option<(FollowingRope, &'static str)>,
     stop: Option<StopView>,
     progress: Progress,
+    /// Its run's folder, and once it has ended what came of it.
+    folder: Option<PathBuf>,
+    result: Option<String>,
     /// What it left in view.
     left: Snapshot,
+}
+
+impl Shown {
+    /// What is said after its end.
+    fn ended(&mut self) -> String {
+        if self.result.is_none() {
+            self.result = self.folder.as_deref().and_then(headline_of);
+        }
+        let result = self.result.as_ref().map(|said| format!(": {said}"));
+        let report = self.folder.as_ref().map(|folder| folder.join(REPORT));
+        let report = report.filter(|path| path.is_file());
+        let report = report.map(|path| format!("; report `{}`", path.display()));
+        let [result, report] = [result, report].map(Option::unwrap_or_default);
+        format!("the run has ended{result}{report}; the next one is shown as soon as it begins")
+    }
 }
 
 /// The watcher: call [`Watcher::turn`] until it is enough.
@@ -311,7 +329,7 @@ impl Watcher {
             snapshot.note = if left.arm.is_empty() {
                 "no controller runs yet; it is shown as soon as one does".to_owned()
             } else {
-                "the run has ended; the next one is shown as soon as it begins".to_owned()
+                self.shown.ended()
             };
             return Snapshot {
                 arm: left.arm,
@@ -325,8 +343,9 @@ impl Watcher {
         };
         let facts = attached.controller.as_ref().map(|c| &c.facts);
         snapshot.cell = self.here.of_run(facts.and_then(|f| f.cell));
-        let folder = facts.and_then(|facts| facts.folder.as_ref()?.file_name());
-        snapshot.title = match folder {
+        self.shown.folder = facts.and_then(|facts| facts.folder.clone());
+        let name = self.shown.folder.as_ref().and_then(|f| f.file_name());
+        snapshot.title = match name {
             Some(name) => format!("{} (domain {})", name.display(), attached.domain),
             None => format!("domain {}", attached.domain),
         };

@@ -22,6 +22,7 @@ pub use latency::histogram;
 pub use limits::LimitRow;
 pub use page::{PLOTS, STYLE, VIEW};
 pub use planned::PlannedMotion;
+pub(crate) use read::headline_of;
 pub use read::{rope_rows, simulated_rope};
 pub use replay::{arm_points, tenths_mm};
 
@@ -29,6 +30,9 @@ use anyhow::ensure;
 use page::SIZE_MAX_BYTES;
 use run_log::{CellHere, files};
 use std::path::{Path, PathBuf};
+
+/// A run's report in its folder.
+pub(crate) const REPORT: &str = "report.html";
 
 /// A report that was written.
 #[derive(Debug)]
@@ -56,7 +60,7 @@ pub fn write(run: &Path, out: Option<&Path>, here: &CellHere) -> anyhow::Result<
         run.display(),
         html.len()
     );
-    let path = out.map_or_else(|| run.join("report.html"), Path::to_owned);
+    let path = out.map_or_else(|| run.join(REPORT), Path::to_owned);
     files::write_atomic(&path, html.as_bytes())?;
     Ok(Written {
         path,

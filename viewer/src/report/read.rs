@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use shared_types::ipc::CycleRecord;
 use shared_types::rope::RANGES;
-use shared_types::{MonotonicNs, RopeParams};
+use shared_types::{MonotonicNs, Plan, RopeParams};
 use std::path::Path;
 
 /// Parts of `summary.json` that are told elsewhere, and better.
@@ -80,6 +80,28 @@ pub fn simulated_rope(run: &Path) -> anyhow::Result<Vec<RopeMotion>> {
     Ok(scenes(&known, &summary)?.into_iter().map(motion).collect())
 }
 
+/// What came of a run in one line; nothing before it has ended.
+pub(crate) fn headline_of(run: &Path) -> Option<String> {
+    let run = Run::open(run).ok()?;
+    let summary = run.summary().ok()??;
+    let plan = run.plan().ok()?;
+    let rope = run.rope().ok()?.or(plan.as_ref().map(|plan| plan.rope));
+    let error = errors(plan.as_ref(), &summary);
+    let tip_radius_m = rope.map_or(0.0, |rope| rope.lead_radius_m);
+    Some(headline(&error, &summary, tip_radius_m))
+}
+
+/// What plan and summary of a run tell of its miss.
+fn errors(plan: Option<&Plan>, summary: &Value) -> Errors {
+    Errors {
+        planned_m: plan.map(|plan| plan.predicted_error_m),
+        forecast_90_m: plan.and_then(|plan| Some(plan.forecast?.interval_90_m)),
+        true_m: summary["true_tip_target_distance_m"].as_f64(),
+        camera_m: summary["score"]["closest_m"].as_f64(),
+        camera_interval_m: value(&summary["score"]["interval_m"]),
+    }
+}
+
 pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData> {
     ensure!(
         run.is_dir(),
@@ -131,13 +153,7 @@ pub(crate) fn read_run(run: &Path, here: &CellHere) -> anyhow::Result<ReportData
     let scenes = scenes(&known, &summary).with_context(|| format!("run `{}`", run.display()))?;
     let moving: Vec<_> = motions(&cycles.cycles).into_iter().flatten().collect();
     let pictures = pictures::read(run, &mut missing)?;
-    let error = Errors {
-        planned_m: plan.as_ref().map(|p| p.predicted_error_m),
-        forecast_90_m: plan.as_ref().and_then(|p| Some(p.forecast?.interval_90_m)),
-        true_m: summary["true_tip_target_distance_m"].as_f64(),
-        camera_m: summary["score"]["closest_m"].as_f64(),
-        camera_interval_m: value(&summary["score"]["interval_m"]),
-    };
+    let error = errors(plan.as_ref(), &summary);
     let tip_radius_m = known.rope.map_or(0.0, |rope| rope.lead_radius_m);
     let headline = headline(&error, &summary, tip_radius_m);
     let spans = spans(&known, &summary);

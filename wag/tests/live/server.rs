@@ -123,6 +123,23 @@ fn it_is_there_before_a_run_and_after_it_and_sees_the_next() {
         drop(fake);
         let over = states.until("its end", |s| s["controller"].is_null());
         assert!(over["note"].as_str().unwrap().contains("has ended"));
+        let (summary, report) = (
+            dir.path().join("summary.json"),
+            dir.path().join("report.html"),
+        );
+        std::fs::write(
+            summary,
+            r#"{"task": "strike", "score": {"closest_m": 0.0031}}"#,
+        )
+        .unwrap();
+        std::fs::write(&report, "").unwrap();
+        let named = format!(
+            "the run has ended: Hit: 3.1 mm; report `{}`;",
+            report.display()
+        );
+        states.until("what came of it", |s| {
+            s["note"].as_str().unwrap().contains(&named)
+        });
         let shown = over["arm"].as_array().unwrap().len();
         assert_eq!(shown, 27, "it stays in view");
     }
