@@ -31,8 +31,8 @@ fn tip(end_m: Vector3<f64>, t_s: f64) -> Vector3<f64> {
     start_m + (end_m - start_m) * u + Vector3::z() * arc_m
 }
 
-/// Films a throw whose tip ends at a place of the target's frame, or from 1.4 s on, where it
-/// `hides` the domino, before that; the domino falls at 0.8 s, if it does.
+/// Films a throw whose tip ends at a place of the target's frame; the domino falls at 0.8 s, if
+/// it does, and from 1.4 s on the tip hangs before it, if it `hides` it.
 fn film(
     task: Task,
     target_m: [f64; 3],

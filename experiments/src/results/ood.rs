@@ -70,10 +70,11 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     ];
     let picture = experiment.picture("out-of-distribution score", curves)?;
     let (found, false_alarms) = (flagged(&outside), flagged(&inside));
+    let kinds = noticed(&outside);
     let own = json!({
         "ropes_inside": inside.len(), "ropes_outside": outside.len(),
         "area_under_curve": area, "found": found, "false_alarms": false_alarms,
-        "kinds": noticed(&outside),
+        "kinds": kinds,
     });
     experiment.finish(&all, picture, own, || {
         println!(
@@ -83,7 +84,7 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
             100.0 * found,
             100.0 * false_alarms
         );
-        for Noticed { kind, ropes, found } in noticed(&outside) {
+        for Noticed { kind, ropes, found } in &kinds {
             println!("{kind}: {found} of {ropes} found");
         }
     })

@@ -23,7 +23,8 @@ const WITHIN_MS: f64 = 100.0;
 
 /// How long after a press of the page's Stop button, `after` the motion has begun, the arm was
 /// told otherwise than planned (ms): the first setpoint of the brake, by the arm's own time of
-/// arrival. `None`, and a word, where the motion began too early or ended otherwise before.
+/// arrival. `None`, and a word, where the press met no motion: between two of them, or where the
+/// run had ended, or failed otherwise, before.
 fn late_ms(page: &mut Chromium, arm: &SimulatedArm, run: &Path, after: Duration) -> Option<f64> {
     let [joints, _, rich, _] = arm.ports().reports;
     let line = format!(
@@ -46,6 +47,7 @@ fn late_ms(page: &mut Chromium, arm: &SimulatedArm, run: &Path, after: Duration)
         (moves() || wiggle.0.try_wait().unwrap().is_some()).then_some(())
     });
     sleep(after);
+    let had_ended = wiggle.0.try_wait().unwrap().is_some();
     let pressed = xarm_sim::clock::now();
     page.mouse("mousePressed", stop);
     let _ = wiggle.0.wait().unwrap();
@@ -55,7 +57,12 @@ fn late_ms(page: &mut Chromium, arm: &SimulatedArm, run: &Path, after: Duration)
     let brakes = ControllerMode::Braking as u8;
     let braking = cycles.iter().find(|c| c.mode == brakes && c.sent != 0);
     let faults: BTreeSet<u16> = cycles.iter().map(|c| c.fault).collect();
-    let asked = faults.contains(&(FaultCode::OperatorStop as u16));
+    let stop = FaultCode::OperatorStop as u16;
+    let asked = faults.contains(&stop);
+    let failed = faults
+        .iter()
+        .any(|code| ![stop, FaultCode::None as u16].contains(code));
+    assert!(asked || failed || had_ended, "a press stopped nothing");
     let Some(braking) = braking.filter(|_| asked && !is_late) else {
         println!("not pressed into a motion: late {is_late}, faults {faults:?}");
         return None;
