@@ -90,3 +90,17 @@ fn the_vendor_sdk_accepts_the_simulated_arm() {
     println!("{text}");
     assert!(output.status.success(), "{text}\n{}", said(&output));
 }
+
+#[test]
+fn our_encoder_is_compared_with_what_the_vendor_sdk_encodes() {
+    let Some(mut python) = python() else { return };
+    let folder = "../rt-controller/core/sdk-requests";
+    let output = python.arg(format!("{folder}/make.py")).output().unwrap();
+    let kept = std::fs::read_to_string(format!("{folder}/requests.txt")).unwrap();
+    assert_eq!(
+        String::from_utf8_lossy(&output.stdout),
+        kept,
+        "{}",
+        said(&output)
+    );
+}

@@ -77,54 +77,139 @@ fn requests_are_understood_or_refused_for_what_is_wrong_with_them() {
     }
 }
 
-/// Parameters as the vendor's documents list them.
-#[test]
-fn requests_and_replies_have_the_vendors_layout() {
-    let floats =
-        |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
-    let angles = [0.5_f32, -0.25, 0.75, 1.0, -1.5, 2.0, -3.0];
-    let q = JointVector(angles.map(f64::from));
+/// What the vendor's SDK encodes for these arguments (`sdk-requests/make.py` prints it).
+const SDK_REQUESTS: &str = include_str!("../../../sdk-requests/requests.txt");
+
+/// Numbers that an f32 holds exactly.
+const ANGLES: [f32; 7] = [0.5, -0.25, 0.75, 1.0, -1.5, 2.0, -3.0];
+
+/// The requests of `sdk-requests/make.py`, in its order.
+fn requests() -> Vec<(&'static str, Command)> {
+    let q = JointVector(ANGLES.map(f64::from));
+    let (speed_rad_s, acceleration_rad_s2) = (0.5, 2.0);
+    let move_joint = |checked| Command::MoveJoint {
+        target: q,
+        speed_rad_s,
+        acceleration_rad_s2,
+        checked,
+    };
     let velocity = |synchronised, duration_s| Command::JointVelocity {
         velocity: q,
         synchronised,
         duration_s,
     };
-    let offset = TcpPose {
-        position_m: [0.0, -0.05, 0.2],
-        rpy_rad: [0.5, 0.25, -1.0],
-    };
-    let offset_mm_rad = floats(&[0.0, -50.0, 200.0, 0.5, 0.25, -1.0]);
+    let enable = |joint, enable| Command::MotionEnable { joint, enable };
+    vec![
+        ("version", Command::Version),
+        ("serial_numbers", Command::SerialNumbers),
+        ("motion_enable", enable(Command::ALL_JOINTS, true)),
+        ("motion_disable", enable(3, false)),
+        ("state_ready", Command::SetState(StateRequest::Ready)),
+        ("state_pause", Command::SetState(StateRequest::Pause)),
+        ("state_stop", Command::SetState(StateRequest::Stop)),
+        (
+            "state_decelerated_stop",
+            Command::SetState(StateRequest::DeceleratedStop),
+        ),
+        ("get_state", Command::GetState),
+        ("buffered", Command::Buffered),
+        ("get_fault", Command::GetFault),
+        ("clean_error", Command::CleanError),
+        ("clean_warning", Command::CleanWarning),
+        (
+            "brake_release",
+            Command::Brake {
+                joint: Command::ALL_JOINTS,
+                release: true,
+            },
+        ),
+        ("mode_position", Command::SetMode(Mode::Position)),
+        ("mode_servo", Command::SetMode(Mode::Servo)),
+        ("mode_velocity", Command::SetMode(Mode::JointVelocity)),
+        ("move_joint", move_joint(None)),
+        ("move_joint_checked", move_joint(Some(1))),
+        (
+            "move_home",
+            Command::MoveHome {
+                speed_rad_s,
+                acceleration_rad_s2,
+                checked: None,
+            },
+        ),
+        ("servo_joint", Command::ServoJoint(q)),
+        ("joint_jerk", Command::JointJerk(20.0)),
+        ("joint_acceleration", Command::JointAcceleration(10.0)),
+        (
+            "tcp_offset",
+            Command::TcpOffset(TcpPose {
+                position_m: [0.0, -0.05, 0.2],
+                rpy_rad: [0.5, 0.25, -1.0],
+            }),
+        ),
+        (
+            "tcp_load",
+            Command::TcpLoad {
+                mass_kg: 0.5,
+                centre_m: [0.001, -0.002, 0.064],
+            },
+        ),
+        ("collision_sensitivity", Command::CollisionSensitivity(3)),
+        ("teach_sensitivity", Command::TeachSensitivity(2)),
+        ("tcp_pose", Command::TcpPose),
+        (
+            "joints_commanded",
+            Command::JointPosition(JointQuery::Commanded),
+        ),
+        (
+            "joints_measured",
+            Command::JointPosition(JointQuery::MEASURED),
+        ),
+        (
+            "joints_measured_with_rates",
+            Command::JointPosition(JointQuery::Quantities {
+                quantities: 3,
+                targets: false,
+            }),
+        ),
+        ("forward_kinematics", Command::ForwardKinematics(q)),
+        ("digital_inputs", Command::DigitalInputs),
+        ("joint_limit_test", Command::JointLimitTest(q)),
+        ("velocity", velocity(true, None)),
+        ("velocity_with_duration", velocity(false, Some(0.5))),
+        ("set_speed_limit_factor", Command::SetSpeedLimitFactor(1.25)),
+        ("get_speed_limit_factor", Command::GetSpeedLimitFactor),
+        ("feedback_check", Command::FeedbackCheck),
+        ("feedback_mask", Command::FeedbackMask(3)),
+    ]
+}
+
+#[test]
+fn requests_are_the_bytes_of_the_vendors_encoder() {
+    let (requests, protocols) = (requests(), [Protocol::Private, Protocol::PrivateHeartbeat]);
+    let mut ours = String::new();
+    for (n, (protocol, (name, command))) in (1..)
+        .zip((protocols.iter()).flat_map(|p| requests.iter().map(move |request| (*p, request))))
+    {
+        let mut out = [0; MAX_FRAME_LEN];
+        let len = emit_command(&mut out, n, protocol, command).unwrap();
+        let hex: String = out[..len].iter().map(|b| format!("{b:02x}")).collect();
+        ours += &format!("{} {name} {hex}\n", u16::from_be_bytes([out[2], out[3]]));
+    }
+    // The first line tells the SDK's version.
+    let (_, sdks) = SDK_REQUESTS.split_once('\n').unwrap();
+    assert_eq!(ours, sdks);
+    let sent: Vec<Register> = requests.iter().map(|(_, c)| c.register()).collect();
+    assert!(TYPED.iter().all(|register| sent.contains(register)));
+}
+
+/// Replies as the vendor's documents list them.
+#[test]
+fn replies_have_the_vendors_layout() {
+    let floats =
+        |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
+    let q = JointVector(ANGLES.map(f64::from));
     let protocol = Protocol::Private;
     let mut out = [0; MAX_FRAME_LEN];
-    for (command, register, parameters) in [
-        (Command::SetState(StateRequest::Stop), 12, vec![4]),
-        (
-            Command::ServoJoint(q),
-            29,
-            [floats(&angles), vec![0; 12]].concat(),
-        ),
-        (
-            velocity(true, None),
-            81,
-            [floats(&angles), vec![1]].concat(),
-        ),
-        (
-            velocity(false, Some(0.5)),
-            81,
-            [floats(&angles), vec![0], floats(&[0.5])].concat(),
-        ),
-        (Command::TcpOffset(offset), 35, offset_mm_rad),
-        (
-            Command::SetSpeedLimitFactor(1.25),
-            232,
-            [vec![1], floats(&[1.25])].concat(),
-        ),
-    ] {
-        let n = emit_command(&mut out, 0x0102, protocol, &command).unwrap();
-        let len = u8::try_from(parameters.len() + 1).unwrap();
-        let head = [1, 2, 0, 2, 0, len, register];
-        assert_eq!(out[..n], [&head[..], &parameters].concat(), "{command:?}");
-    }
     let motion = ReplyData::JointMotion {
         quantities: 2,
         position: q,
@@ -138,7 +223,7 @@ fn requests_and_replies_have_the_vendors_layout() {
         (
             motion,
             42,
-            [floats(&angles), floats(&angles.map(|v| v * 2.0))].concat(),
+            [floats(&ANGLES), floats(&ANGLES.map(|v| v * 2.0))].concat(),
         ),
     ] {
         let (transaction, parameters) = (0x0102, &[][..]);
@@ -155,16 +240,10 @@ fn requests_and_replies_have_the_vendors_layout() {
     }
 }
 
-#[test]
-fn these_registers_are_typed() {
+/// Registers with a typed form.
+const TYPED: [Register; 30] = {
     use Register as R;
-    // A joint, a state, a level and a number of quantities; or a speed limit factor.
-    let parsed = |register: &R| {
-        let parse = |byte| Command::parse(register.code(), &[byte; 60]);
-        parse(3).or_else(|_| parse(1)).is_ok()
-    };
-    let typed: Vec<Register> = R::ALL.iter().copied().filter(parsed).collect();
-    let listed = [
+    [
         R::Version,
         R::SerialNumbers,
         R::MotionEnable,
@@ -195,6 +274,16 @@ fn these_registers_are_typed() {
         R::GetParameter,
         R::FeedbackCheck,
         R::FeedbackMask,
-    ];
-    assert_eq!(typed, listed);
+    ]
+};
+
+#[test]
+fn these_registers_are_typed() {
+    // A joint, a state, a level and a number of quantities; or a speed limit factor.
+    let parsed = |register: &Register| {
+        let parse = |byte| Command::parse(register.code(), &[byte; 60]);
+        parse(3).or_else(|_| parse(1)).is_ok()
+    };
+    let typed: Vec<Register> = Register::ALL.iter().copied().filter(parsed).collect();
+    assert_eq!(typed, TYPED);
 }
