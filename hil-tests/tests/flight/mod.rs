@@ -19,8 +19,6 @@ use shared_types::ipc::ControllerMode;
 use std::collections::BTreeMap;
 use xarm_sim::FaultScript;
 
-/// Pause from fault to fault (s).
-const FAULT_EVERY_S: f64 = 6.0;
 /// Nearer to the start pose than this is at home (rad).
 const HOME_RAD: f64 = 0.01;
 /// Largest joint speed of a rig that may be brought up again (rad/s).
@@ -54,7 +52,7 @@ pub(crate) struct Flight {
     pub(crate) causes: usize,
 }
 
-fn script(span_s: f64) -> FaultScript {
+fn script(span_s: f64, pause_s: f64) -> FaultScript {
     let mut text = String::new();
     let mut at_s = 3.0;
     for fault in FAULTS.iter().cycle() {
@@ -63,7 +61,7 @@ fn script(span_s: f64) -> FaultScript {
         }
         text += &entry(&format!("at_s = {at_s:.3}"), fault);
         // Not in step with the swings: each fault meets every part of them.
-        at_s += FAULT_EVERY_S + 0.137;
+        at_s += pause_s + 0.137;
     }
     text.parse().unwrap()
 }
@@ -78,9 +76,11 @@ fn from_here(q: JointVector) -> Motion {
     }
 }
 
-/// Flies for `span_s`: who is stopped is brought up again and goes on.
-pub(crate) fn fly(span_s: f64) -> Flight {
-    let mut config = VirtualRigConfig::new(Thresholds::strict().into(), script(span_s));
+/// Flies for `span_s`, with a fault every `pause_s` or so: who is stopped is brought up again and
+/// goes on.
+pub(crate) fn fly(span_s: f64, pause_s: f64) -> Flight {
+    let faults = script(span_s, pause_s);
+    let mut config = VirtualRigConfig::new(Thresholds::strict().into(), faults);
     config.arm.seed = 20;
     let before = ControlState::new(config.limits.clone(), config.settings);
     let mut rig = VirtualRig::new(config);
