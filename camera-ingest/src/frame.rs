@@ -13,6 +13,9 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
+/// Most bytes of a picture's samples, unpacked: a pair of 12 megapixels each in colour.
+const PICTURE_MAX_BYTES: usize = 72_000_000;
+
 /// Why bytes are no frame.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
@@ -212,8 +215,11 @@ impl StereoFrame {
         let mut decoder = png::Decoder::new(Cursor::new(bytes));
         decoder.set_transformations(png::Transformations::normalize_to_color8());
         let mut reader = decoder.read_info().map_err(fail)?;
-        let too_large = || FrameError::png("it is too large");
-        let mut pixels = vec![0; reader.output_buffer_size().ok_or_else(too_large)?];
+        let size_bytes = reader.output_buffer_size();
+        let too_large = || FrameError::png("it has more pixels than any camera's picture");
+        // What a file claims to hold is believed only so far.
+        let size_bytes = size_bytes.filter(|bytes| *bytes <= PICTURE_MAX_BYTES);
+        let mut pixels = vec![0; size_bytes.ok_or_else(too_large)?];
         let info = reader.next_frame(&mut pixels).map_err(fail)?;
         let size_px = [info.width as usize, info.height as usize];
         check_width(size_px[0])?;
@@ -374,6 +380,18 @@ mod tests {
         );
         assert!(ImageFrame::left_from_yuyv(&bytes[1..], [4, 2], 7, 3).is_err());
         assert_eq!((frame.0.stamp_ns, frame.0.sequence), (7, 3));
+    }
+
+    /// Memory for it is not even asked for.
+    #[test]
+    fn a_png_that_claims_more_pixels_than_cameras_have_is_refused() {
+        let mut bytes = Vec::new();
+        let encoder = png::Encoder::new(&mut bytes, 4096, 4_000_000);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_chunk(png::chunk::IDAT, &[0; 8]).unwrap();
+        drop(writer);
+        let refused = StereoFrame::from_png(&bytes, 0, 0).unwrap_err();
+        assert!(refused.to_string().contains("more pixels"), "{refused}");
     }
 
     #[test]

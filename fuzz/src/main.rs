@@ -1,6 +1,5 @@
 //! Fuzzes one kind of input, which `WAG_FUZZ_TARGET` names. Each module has `run`, which
-//! takes any bytes and panics when something is wrong, and `seeds`, examples made by our
-//! own encoders to begin with.
+//! takes any bytes and panics when something is wrong, and `seeds`, examples to begin with.
 //!
 //! `.ci/fuzz SECONDS` builds this and runs every target. An input that fails is kept in
 //! `fuzz/artifacts`; fix it with a test of the crate it fails in.
@@ -11,6 +10,8 @@ mod calibration;
 mod configs;
 mod messages;
 mod recording;
+mod run_file;
+mod tables;
 mod video;
 mod wire;
 
@@ -42,6 +43,8 @@ fn target() -> &'static Target {
             configs,
             messages,
             recording,
+            run_file,
+            tables,
             video,
             wire
         );

@@ -1,14 +1,17 @@
-//! Films: the container and the pictures inside.
+//! Films: the container and the pictures inside; pictures in files of their own.
 
 use crate::folder;
-use camera_ingest::open_video;
 use camera_ingest::source::{FrameSource, StereoSource};
+use camera_ingest::{StereoFrame, open_video};
 
 /// Pictures looked at in one film.
 const PICTURES: usize = 3;
 
-/// Opens `data` as a film and decodes its first pictures.
+/// Reads `data` as a picture, opens it as a film and decodes its first pictures.
 pub fn run(data: &[u8]) {
+    let _ = StereoFrame::from_png(data, 0, 0);
+    let _ = StereoFrame::from_png(&with_right_sums(data), 0, 0);
+    let _ = StereoFrame::from_jpeg(data, 0, 0);
     let path = folder().join("video.avi");
     std::fs::write(&path, data).expect("a film");
     if let Ok(mut film) = open_video(&path, None) {
@@ -16,6 +19,26 @@ pub fn run(data: &[u8]) {
             let _ = film.read(index);
         }
     }
+}
+
+/// The chunks of a PNG with the checksums that belong to them.
+fn with_right_sums(data: &[u8]) -> Vec<u8> {
+    let mut bytes = data.to_vec();
+    let mut at = PNG_MAGIC.len();
+    while let Some(head) = bytes.get(at..at + 8) {
+        let len = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
+        let Some(summed) = bytes.get(at + 4..(at + 8).saturating_add(len)) else {
+            break;
+        };
+        let sum = crc32fast::hash(summed).to_be_bytes();
+        at += 8 + len;
+        let Some(place) = bytes.get_mut(at..at + 4) else {
+            break;
+        };
+        place.copy_from_slice(&sum);
+        at += 4;
+    }
+    bytes
 }
 
 fn chunk(code: &[u8; 4], body: &[u8]) -> Vec<u8> {
@@ -40,7 +63,13 @@ pub fn seeds() -> Vec<Vec<u8>> {
     };
     let picture = jpeg();
     let torn = &picture[..picture.len() / 2];
-    vec![film(&[&picture, &picture]), film(&[]), film(&[torn])]
+    vec![
+        film(&[&picture, &picture]),
+        film(&[]),
+        film(&[torn]),
+        PNG.to_vec(),
+        picture,
+    ]
 }
 
 /// A picture of 16 x 8 grey pixels: two blocks without anything in them.
@@ -62,3 +91,12 @@ fn jpeg() -> Vec<u8> {
     ]
     .concat()
 }
+
+/// How every PNG begins.
+const PNG_MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// 16 x 1 black pixels.
+const PNG: &[u8] =
+    b"\x89PNG\x0d\x0a\x1a\x0a\x00\x00\x00\x0dIHDR\x00\x00\x00\x10\x00\x00\x00\x01\x08\x00\x00\
+    \x00\x00\xf2\x12q\x83\x00\x00\x00\x0bIDATx\x9cc`@\x03\x00\x00\x11\x00\x01\xee&\x06O\x00\
+    \x00\x00\x00IEND\xaeB`\x82";
