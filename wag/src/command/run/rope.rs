@@ -252,9 +252,7 @@ impl Run<'_> {
                 Attempt::Made(settled) => break settled,
                 Attempt::Unheld => self.warn("the control was not held soon after MOVE, or let go"),
                 Attempt::Late if planning_s < longest_s => planning_s *= 2.0,
-                Attempt::Late => {
-                    bail!("planning takes too long on this machine; stop other programs")
-                }
+                Attempt::Late => bail!("planning takes too long here; stop other programs"),
             }
         };
         let within_s = if asks { WATCHED_S } else { SETTLED_WITHIN_S };
@@ -311,14 +309,18 @@ impl Run<'_> {
         let mode = OperatingMode::Wiggle;
         self.check_motion(&found.trajectory, mode)?;
         let left_s = || begin.since_s(MonotonicNs(now_ns())) - HANDOVER_S;
+        let until = |before_s: f64| Duration::from_secs_f64((left_s() - before_s).max(0.0));
+        // An arming lasts some seconds only, and where planning was quick there are many left.
+        self.session.idle(until(1.0))?;
+        if left_s() > 0.0 {
+            let confirmed_ns = confirmed.map_or_else(now_ns, |at| at.0);
+            arm_for(self.session, &self.arm, mode, Some(confirmed_ns))?;
+        }
         if left_s() < 0.0 {
             return Ok(Attempt::Late);
         }
-        let confirmed_ns = confirmed.map_or_else(now_ns, |at| at.0);
-        arm_for(self.session, &self.arm, mode, Some(confirmed_ns))?;
-        let early = Duration::from_secs_f64((left_s() - 0.03).max(0.0));
-        self.session.idle(early)?;
-        std::thread::sleep(Duration::from_secs_f64(left_s().max(0.0)));
+        self.session.idle(until(0.03))?;
+        std::thread::sleep(until(0.0));
         if !self.session.is_held() {
             return Ok(Attempt::Unheld);
         }
