@@ -16,6 +16,7 @@ mod picture;
 mod pipeline;
 mod real_dlo;
 mod robust;
+mod rope_accuracy;
 mod sensitivity;
 mod sensitivity_map;
 mod sensitivity_picture;
@@ -38,6 +39,7 @@ pub fn run(command: &ResultCommand) -> Outcome<Option<Value>> {
         ResultCommand::FullPipeline(args) => return other_reality::run_full(args),
         ResultCommand::RealDlo(args) => return real_dlo::run(args),
         ResultCommand::ContactDynamics(args) => return contact_dynamics::run(args),
+        ResultCommand::RopeAccuracy(args) => return rope_accuracy::run(args),
         ResultCommand::Sysid(args) => ("sysid", args, sysid::run),
         ResultCommand::MotionFidelity(args) => ("motion-fidelity", args, fidelity::run),
         ResultCommand::SysidOod(args) => ("sysid-ood", args, ood::run),

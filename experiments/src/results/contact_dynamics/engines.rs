@@ -5,19 +5,19 @@ use crate::results::other_reality::child::{Mujoco, pose};
 use anyhow::{Context, ensure};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rope_sim::{
-    AttachMotion, Candidate, Domino, FrameTimes, Obstacle, Outcome, Precision, Scene, Shape,
-    SimOptions, roll_out_in,
+    AttachMotion, Candidate, Domino, FrameTimes, Obstacle, Outcome, Precision, Rollout, Scene,
+    Shape, SimOptions, roll_out_in,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 const SCRIPT: &str = include_str!("../../../other_reality/contact.py");
 /// Time between two places of the tip that are compared (s).
-pub(super) const PERIOD_S: f64 = 1e-3;
+pub(in crate::results) const PERIOD_S: f64 = 1e-3;
 
 /// What one engine makes of a scene.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Course {
+pub(in crate::results) struct Course {
     /// From the start on, one every [`PERIOD_S`] (m).
     pub tip_m: Vec<Vector3<f64>>,
     /// When the rope first touched anything (s).
@@ -27,27 +27,46 @@ pub(super) struct Course {
 
 /// What becomes of the domino.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct DominoCourse {
+pub(in crate::results) struct DominoCourse {
     /// When its tilt passed 45 degrees (s).
     pub down_at_s: Option<f64>,
     /// Greatest tilt up to then, either way (rad).
     pub peak_tilt_rad: f64,
 }
 
-/// The scene in `rope-sim`, in steps of `step_s`.
-pub(super) fn ours(scene: &TouchScene, step_s: f64) -> anyhow::Result<Course> {
-    let count = (scene.horizon_s / PERIOD_S).round() as usize + 1;
+/// How many times the tip's place is told.
+pub(in crate::results) fn places(scene: &TouchScene<impl AttachMotion>) -> usize {
+    (scene.horizon_s / PERIOD_S).round() as usize + 1
+}
+
+/// The rope in `rope-sim`, in steps of `step_s`, among bodies that may differ from the scene's.
+pub(in crate::results) fn rolled_out(
+    scene: &TouchScene<impl AttachMotion>,
+    bodies: &Scene,
+    step_s: f64,
+) -> anyhow::Result<Rollout> {
     let options = SimOptions {
         frames: FrameTimes {
             first_s: 0.0,
             period_s: PERIOD_S,
-            count,
+            count: places(scene),
         },
         ..SimOptions::new(step_s, Precision::F64, scene.horizon_s)
     };
     let candidate = Candidate::new(&scene.rope, &scene.motion);
-    let mut runs = roll_out_in(&scene.scene, &[candidate], &options)?;
-    let run = runs.pop().context("no rollout")?;
+    let mut runs = roll_out_in(bodies, &[candidate], &options)?;
+    runs.pop().context("no rollout")
+}
+
+/// The path of its tip (m).
+pub(in crate::results) fn tip_of(run: &Rollout) -> Vec<Vector3<f64>> {
+    let (frames, tip) = (run.nodes.frames(), run.nodes.nodes() - 1);
+    (0..frames).map(|k| run.nodes.position(k, tip)).collect()
+}
+
+/// The scene in `rope-sim`, in steps of `step_s`.
+pub(super) fn ours(scene: &TouchScene, step_s: f64) -> anyhow::Result<Course> {
+    let run = rolled_out(scene, &scene.scene, step_s)?;
     ensure!(
         run.outcome == Outcome::Clean,
         "`{}` blew up in rope-sim at steps of {step_s} s",
@@ -60,16 +79,13 @@ pub(super) fn ours(scene: &TouchScene, step_s: f64) -> anyhow::Result<Course> {
             .chain(scene.scene.domino.as_ref().map(standing_fast))
             .collect(),
     );
-    let fixed = roll_out_in(&fixed, &[candidate], &options)?;
-    let touched = fixed.iter().flat_map(|run| &run.contacts);
+    let fixed = rolled_out(scene, &fixed, step_s)?;
+    let touched = fixed.contacts.iter();
     let first_s = touched
         .filter_map(|contact| Some(contact.first?.0))
         .reduce(f64::min);
-    let tip = scene.rope.links as usize;
     Ok(Course {
-        tip_m: (0..count)
-            .map(|frame| run.nodes.position(frame, tip))
-            .collect(),
+        tip_m: tip_of(&run),
         first_s,
         domino: run.domino.map(|domino| DominoCourse {
             down_at_s: domino.down_at_s,
@@ -89,9 +105,9 @@ struct Answer {
 
 /// The scene in MuJoCo, in steps of `step_s`, and MuJoCo's version. `domino_stays`: a domino that
 /// has fallen lies in the rope's way, as a real one does, and ours does not.
-pub(super) fn theirs(
+pub(in crate::results) fn theirs(
     mujoco: &Mujoco,
-    scene: &TouchScene,
+    scene: &TouchScene<impl AttachMotion>,
     step_s: f64,
     domino_stays: bool,
 ) -> anyhow::Result<(Course, String)> {
@@ -118,6 +134,12 @@ pub(super) fn theirs(
     });
     let answer = mujoco.ask(SCRIPT, &serde_json::to_vec(&request)?)?;
     let answer: Answer = serde_json::from_slice(&answer).context("answer of MuJoCo's rope")?;
+    ensure!(
+        answer.tip_m.len() == 3 * places(scene),
+        "MuJoCo's rope answered with {} numbers, not {}",
+        answer.tip_m.len(),
+        3 * places(scene)
+    );
     let points = answer.tip_m.chunks_exact(3);
     let course = Course {
         tip_m: points.map(Vector3::from_column_slice).collect(),

@@ -4,10 +4,10 @@
 //! Both engines are also run with half the step: what that changes is their own error, and a
 //! difference between them below it means nothing.
 
-mod engines;
+pub(super) mod engines;
 mod motion;
 mod row;
-mod scenes;
+pub(super) mod scenes;
 
 use super::other_reality::child::Mujoco;
 use crate::args::ContactDynamicsArgs;

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// One step: from here to there without a jump of velocity or acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Ramp {
+pub(in crate::results) struct Ramp {
     pub from_s: f64,
     pub to_s: f64,
     pub by_m: [f64; 3],
@@ -40,7 +40,7 @@ impl Ramp {
 
 /// The steps, one after the other or at once, of a frame that is upright at the start.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Ramps {
+pub(in crate::results) struct Ramps {
     pub start_m: [f64; 3],
     pub ramps: Vec<Ramp>,
 }

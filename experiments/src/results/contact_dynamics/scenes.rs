@@ -16,11 +16,11 @@ const DOMINO_BEFORE_M: f64 = 0.06;
 
 /// One rope, what it touches and how it is moved.
 #[derive(Debug, Clone)]
-pub(super) struct TouchScene {
+pub(in crate::results) struct TouchScene<M = Ramps> {
     pub name: &'static str,
     pub rope: RopeParams,
     pub scene: Scene,
-    pub motion: Ramps,
+    pub motion: M,
     pub horizon_s: f64,
 }
 
