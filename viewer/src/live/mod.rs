@@ -224,6 +224,11 @@ impl Watcher {
         (self.snapshot(seen), true)
     }
 
+    /// Folder of the run that is shown, where it is known.
+    pub fn run(&self) -> Option<&Path> {
+        self.shown.folder.as_deref()
+    }
+
     /// Watches something else from now on.
     ///
     /// # Errors

@@ -44,14 +44,15 @@ pub fn run(args: &WatchArgs) -> Outcome<Option<Value>> {
     })?;
     // Whatever happens here may wait; what is watched may not.
     let _ = rustix::process::nice(NICE);
-    let began = Instant::now();
+    let (began, span_s) = (Instant::now(), args.seconds.unwrap_or(f64::INFINITY));
     announce("watch", &url, args.bind);
-    let over = || {
-        args.seconds
-            .is_some_and(|s| began.elapsed().as_secs_f64() >= s)
-    };
-    while !is_interrupted() && !over() {
+    let mut named = None;
+    while !is_interrupted() && began.elapsed().as_secs_f64() < span_s {
         let searched = watcher.turn().or_failed()?;
+        if let Some(run) = watcher.run().filter(|run| named.as_deref() != Some(*run)) {
+            eprintln!("run `{}` is shown", run.display());
+            named = Some(run.to_owned());
+        }
         // What is joined anew in the next turn is still what the preview looks at.
         if let Some(preview) = preview.as_mut().filter(|_| searched) {
             preview.keep(&mut watcher, args.camera.as_deref());

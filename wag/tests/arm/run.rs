@@ -40,6 +40,12 @@ fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_the
         length_m(&again["rope"]),
     );
     assert!((first - second).abs() < 5e-3, "{first} and {second} m");
+
+    // A wiggle by itself films too, and all after it begins from its folder.
+    json_in(here, &format!("wiggle {arm} --camera {domain} --out alone"));
+    let tracked = json_in(here, "identify --video alone --out third.toml");
+    let third = length_m(&tracked["rope"]);
+    assert!((first - third).abs() < 2e-2, "{first} and {third} m");
 }
 
 /// The wall is put up, the rope thrown over it, filmed, and judged by camera and truth alike.

@@ -56,6 +56,11 @@ fn a_name_that_is_not_utf_8_is_refused_before_anything_is_done() {
         );
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    let mut show = command("config show limits");
+    let output = show.env("WAG_CONFIG", &name).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let said = said(&output);
+    assert!(said.contains("WAG_CONFIG names"), "{said}");
 }
 
 #[test]
