@@ -180,7 +180,7 @@ fn assert_follows(stage: &mut Stage, frames: usize) {
         times[0]
     );
     println!("{reported}");
-    assert!(half < 2.0 && most < 8.0, "{reported}");
+    assert!(half < 0.25 && most < 1.5, "{reported}");
 }
 
 #[test]

@@ -103,7 +103,7 @@ fn outcome(seed: u64, capture: Capture) -> Result<(), String> {
         100.0 * f64::from(unconfirmed) / found.track.frames.len() as f64,
     );
     println!("{reported}");
-    let good = lost <= 0.03 && median < 1.0 && p95 < 3.0 && confident_px < 20.0;
+    let good = lost <= 0.01 && median < 0.8 && p95 < 2.0 && confident_px < 6.0;
     if good { Ok(()) } else { Err(reported) }
 }
 
@@ -185,7 +185,7 @@ fn a_rope_that_is_not_there_for_a_while_is_lost_only_then() {
     let errors_px: Vec<f64> = seen.flat_map(|i| filmed.errors_px(&found, i)).collect();
     let p95_px = quantile(&errors_px, 0.95);
     println!("95th percentile {p95_px:.2} px");
-    assert!(p95_px < 3.0, "{p95_px:.2} px");
+    assert!(p95_px < 1.0, "{p95_px:.2} px");
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn rope_and_lead_look_as_thick_as_they_are() {
         let long = (seen.length_m / filmed.length_m - 1.0).abs();
         if !radii.all(|(reported, truth)| (reported - truth).abs() < 1.5e-3)
             || long > 0.02
-            || mean_px > 1.5
+            || mean_px > 0.6
         {
             bad.push(radii_m);
         }
