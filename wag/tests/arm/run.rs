@@ -43,7 +43,7 @@ fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_the
 
     // A wiggle by itself films too, and all after it begins from its folder.
     json_in(here, &format!("wiggle {arm} --camera {domain} --out alone"));
-    let tracked = json_in(here, "identify --video alone --out third.toml");
+    let tracked = json_in(here, "identify --keypoints alone --out third.toml");
     let third = length_m(&tracked["rope"]);
     assert!((first - third).abs() < 2e-2, "{first} and {third} m");
 }
