@@ -238,18 +238,19 @@ impl Run<'_> {
     /// identified rope and begun at the instant it was planned for. It is planned once the
     /// operator has confirmed it, and holds the control where there is one.
     pub fn settle(&mut self, motions: Motions<'_>) -> anyhow::Result<()> {
-        let stage = Stage::begin("settle");
         let asks = self.setup.asks;
         let [mut planning_s, longest_s] = if asks { ASKED_S } else { UNASKED_S };
-        let settled = loop {
+        let (settled, stage) = loop {
             let confirmed = asks.then(|| self.session.confirm(SETTLES, "MOVE"));
             let confirmed = confirmed.transpose()?.map(MonotonicNs);
             self.session.await_control()?;
+            // Its line would draw over the question.
+            let stage = Stage::begin("settle");
             let begin = MonotonicNs(now_ns()).plus_s(planning_s);
             let made = self.settle_at((begin, confirmed), motions, &stage)?;
             self.session.end_hold();
             match made {
-                Attempt::Made(settled) => break settled,
+                Attempt::Made(settled) => break (settled, stage),
                 Attempt::Unheld => self.warn("the control was not held soon after MOVE, or let go"),
                 Attempt::Late if planning_s < longest_s => planning_s *= 2.0,
                 Attempt::Late => bail!("planning takes too long here; stop other programs"),
