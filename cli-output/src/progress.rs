@@ -62,12 +62,14 @@ impl Stage {
             let width = 24usize;
             let filled = (width * p.done.min(p.total) as usize) / p.total as usize;
             self.say(format!(
-                "{}{} {}/{}  {} {:.3}",
+                "{}{} {}/{}  {} {:.*}",
                 "█".repeat(filled),
                 "░".repeat(width - filled),
                 p.done,
                 p.total,
                 p.label,
+                // A count has no decimals.
+                if p.value.fract() == 0.0 { 0 } else { 3 },
                 p.value
             ));
         }

@@ -20,5 +20,5 @@ pub use presence::Switch;
 pub use received::Received;
 use run_file::RunFile;
 pub use run_file::remedy;
-pub use service::of_service;
+pub use service::{has_stopped, of_service};
 pub use supervisor::{ProcessSpec, Supervisor};

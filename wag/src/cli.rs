@@ -22,7 +22,7 @@ use values::{host, mass_kg, offset_ms, one_of, rate_hz};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli_output::seed;
-use planner::identify::Method;
+use planner::identify::{Method, tape_length_m};
 use rope_sim::Precision;
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -301,7 +301,7 @@ pub struct IdentifyArgs {
     #[arg(long, allow_negative_numbers = true, value_parser = mass_kg)]
     pub lead_mass: Option<f64>,
     /// Length of the rope measured by tape, clamp to lead centre (m); taken to be right to 2 mm.
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = tape_length_m)]
     pub length: Option<f64>,
     /// Seed of the search.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]

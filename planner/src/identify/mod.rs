@@ -40,7 +40,7 @@ mod tests;
 pub use error::IdentifyError;
 pub use fit::WIDE;
 pub use information::{WiggleInformation, information};
-pub use options::{IdentifyOptions, Method};
+pub use options::{IdentifyOptions, Method, tape_length_m};
 
 use crate::observation::Observation;
 use crate::phi::PhiNet;

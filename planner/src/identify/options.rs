@@ -162,13 +162,25 @@ pub(super) fn check(o: &Observation<'_>, options: &IdentifyOptions) -> Result<()
     Err(IdentifyError::Film(reason))
 }
 
+/// Lengths of ropes (m), and the same in words.
+const TAPE_M: RangeInclusive<f64> = 0.05..=5.0;
+const TAPE: &str = "0.05 to 5 m";
+
+/// A rope's length (m) measured by tape, as a command takes it.
+///
+/// # Errors
+/// It is no length of a rope, in words.
+pub fn tape_length_m(text: &str) -> Result<f64, String> {
+    let length_m = text.parse().ok().filter(|m| TAPE_M.contains(m));
+    length_m.ok_or_else(|| format!("a rope's length is {TAPE}, written in m: 0.55, not 55"))
+}
+
 /// Refuses what cannot be searched with, never ends, or would pass any film.
 fn check_options(o: &IdentifyOptions) -> Result<(), IdentifyError> {
     const STEP: &str = "above 0 and at most 0.005 s";
     const DEVIATION: &str = "above 0 and at most 1 (m, rad)";
     const CLOCK: &str = "0.001 to 1 s";
     const LEAD: &str = "above 0 and below 10 kg";
-    const TAPE: &str = "0.05 to 5 m";
     let within = |option, value: f64, range: RangeInclusive<f64>, expected| {
         (option, value, range.contains(&value), expected)
     };
@@ -196,7 +208,7 @@ fn check_options(o: &IdentifyOptions) -> Result<(), IdentifyError> {
             lead_kg > 0.0 && lead_kg < 10.0,
             LEAD,
         ),
-        within("length_m", o.length_m.unwrap_or(1.0), 0.05..=5.0, TAPE),
+        within("length_m", o.length_m.unwrap_or(1.0), TAPE_M, TAPE),
         deviation("camera_position_std_m", o.camera_position_std_m),
         deviation("camera_look_at_std_m", o.camera_look_at_std_m),
         deviation("camera_roll_std_rad", o.camera_roll_std_rad),

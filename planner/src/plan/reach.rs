@@ -96,23 +96,20 @@ pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Resul
     };
     let farthest_m = target_m.into_iter().map(f64::abs).fold(0.0, f64::max);
     let hint = unit_hint("target_m", farthest_m, radius_max);
+    // What was probably meant.
+    let [x, y, z] = target_m.map(|v| if hint.is_empty() { v } else { v / 1000.0 });
     Err(PlanError::Unreachable {
         target_m,
-        nearest_m: nearest(rho, target_m, rho_max, radius_max, floor_z_m),
+        nearest_m: nearest([x, y, z], rho_max, radius_max, floor_z_m),
         reason: reason + hint,
     })
 }
 
 /// A point within the bounds, on the target's bearing.
-fn nearest(
-    rho: f64,
-    [x, y, z]: [f64; 3],
-    rho_max: f64,
-    radius_max: f64,
-    floor_z_m: f64,
-) -> [f64; 3] {
+fn nearest([x, y, z]: [f64; 3], rho_max: f64, radius_max: f64, floor_z_m: f64) -> [f64; 3] {
     // A little inside each bound, so that the suggestion is accepted itself.
     const INSIDE: f64 = 0.98;
+    let rho = x.hypot(y);
     let mut rho_in = rho.min(rho_max * INSIDE);
     let mut up = z.max(floor_z_m * INSIDE) - SHOULDER_Z_M;
     let radius = rho_in.hypot(up);

@@ -4,6 +4,7 @@ use super::values::{Colour, TASKS, mass_kg, one_of};
 use super::{ArmArgs, CameraArgs, Point};
 use clap::{ArgGroup, Args};
 use cli_output::seed;
+use planner::identify::tape_length_m;
 use shared_types::Task;
 use std::path::PathBuf;
 
@@ -29,11 +30,7 @@ pub struct RunArgs {
     pub target: Option<Point>,
     /// Resume an earlier run at one of these stages: identify (with its keypoints), plan (with its
     /// rope), throw (with its plan).
-    #[arg(
-        long,
-        num_args = 2,
-        value_names = ["STAGE", "RUN"],
-    )]
+    #[arg(long, num_args = 2, value_names = ["STAGE", "RUN"])]
     pub from: Vec<String>,
     /// Throw the strike of this run again, changed so that its miss is taken out.
     #[arg(long, value_name = "RUN", conflicts_with_all = [
@@ -51,7 +48,7 @@ pub struct RunArgs {
     #[arg(long, allow_negative_numbers = true, value_parser = mass_kg)]
     pub lead_mass: Option<f64>,
     /// Length of the rope measured by tape, clamp to lead centre (m); taken to be right to 2 mm.
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = tape_length_m)]
     pub length: Option<f64>,
     /// Plan for this many ropes drawn from the posterior of identification.
     #[arg(long, default_value_t = 0, value_name = "K")]

@@ -29,10 +29,7 @@ pub fn reach(arm: &ArmArgs) -> Outcome<Option<ArmAddress>> {
     if let Some(domain) = &arm.controller {
         let service = Service::find(domain).or_failed()?;
         if let Some(fault) = service.stopped.filter(|_| !arm.acknowledge) {
-            return Err(failed!(
-                "the controller of `{domain}` has stopped ({fault:?}), in the run before or at its end. Look at the arm and at why (`wag explain` of that run), then add --acknowledge; of this fault the manual says: {}",
-                fault.explain()
-            ));
+            return Err(failed!("{}", session::has_stopped(fault)));
         }
         if service.config.pole != config::cell().or_input()?.pole {
             return Err(bad_input!(

@@ -94,8 +94,12 @@ pub fn enable(
     let bring_up = match session.ask(arm, &ControllerRequest::Status, 5.0, |_| ())? {
         ControllerEvent::Status {
             mode: ControllerMode::Faulted,
+            fault,
             ..
-        } if acknowledges => ControllerRequest::Acknowledge,
+        } => {
+            ensure!(acknowledges, session::has_stopped(fault));
+            ControllerRequest::Acknowledge
+        }
         _ => ControllerRequest::Bringup,
     };
     let done = session.ask(arm, &bring_up, 20.0, |event| {

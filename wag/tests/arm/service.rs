@@ -2,7 +2,7 @@
 //! that use them.
 
 use super::support::{
-    Rig, Running, alone, command, json_in, refused_in, send, shared_memory_of, until_recorded,
+    Rig, Running, alone, command, json_in, refused_in, send, shared_memory_of, until_moving,
 };
 use rustix::process::Signal;
 use std::os::unix::net::UnixDatagram;
@@ -89,7 +89,8 @@ fn a_service_takes_one_command_after_the_other_and_a_stop_is_acknowledged() {
     assert!(let_go.contains("DeadManReleased"), "{let_go}");
     let broken_off = command(&format!("{on} broken-off --acknowledge"));
     let mut broken_off = { broken_off }.current_dir(here).spawn().unwrap();
-    until_recorded(&here.join("broken-off"), 100);
+    // Earlier it would break off the bring-up, and no motion.
+    until_moving(&here.join("broken-off"));
     send(broken_off.id(), Signal::INT);
     assert_eq!(broken_off.wait().unwrap().code(), Some(1));
     let stopped = refused_in(here, 1, &format!("{on} third"));

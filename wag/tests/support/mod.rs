@@ -12,6 +12,7 @@ use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
 use run_log::{Channel, McapFile, files};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::{Value, json};
+use shared_types::ipc::{ControllerMode, CycleRecord};
 use shared_types::plan::trajectory_hash_hex;
 use shared_types::{RopeParams, StereoCamera};
 use std::fs;
@@ -201,10 +202,20 @@ pub(crate) fn process_of(run_or_parent: &str, name: &str) -> Option<u32> {
 
 /// Waits until so many control cycles lie in the file of a run under way.
 pub(crate) fn until_recorded(run: &Path, cycles: usize) {
+    until_among(run, |recorded| recorded.len() >= cycles);
+}
+
+/// Waits until a run's recording has a cycle of a motion.
+pub(crate) fn until_moving(run: &Path) {
+    let moves = |cycle: &CycleRecord| ControllerMode::from_raw(cycle.mode).is_moving();
+    until_among(run, |recorded| recorded.iter().any(moves));
+}
+
+fn until_among(run: &Path, are_there: impl Fn(&[CycleRecord]) -> bool) {
     until("the recording", Duration::from_secs(60), || {
         std::thread::sleep(Duration::from_millis(20));
         let recording = run_log::Run::open(run).ok()?.recording().ok()?;
-        (recording.cycles().ok()?.cycles.len() >= cycles).then_some(())
+        are_there(&recording.cycles().ok()?.cycles).then_some(())
     });
 }
 
