@@ -24,6 +24,7 @@ pub use anyhow::anyhow;
 pub use failure::{Failure, OrInput, Outcome, nearest};
 pub use machine::Machine;
 pub use program::{
-    finish, interrupted, is_interrupted, refuse_usage, seed, start, watch_interrupts, watch_parent,
+    finish, interrupted, is_interrupted, parse, refuse_usage, seed, start, watch_interrupts,
+    watch_parent,
 };
 pub use progress::Stage;

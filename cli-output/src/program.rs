@@ -2,7 +2,10 @@
 
 use crate::{Outcome, output};
 use anyhow::Context;
+use clap::error::ErrorKind;
+use clap::{Arg, Command, Parser};
 use serde_json::{Value, json};
+use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +21,33 @@ use tracing_subscriber::prelude::*;
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_e| "a seed is a whole number from 0 to 18446744073709551615".to_owned())
+}
+
+/// Reads the command line `args`, the program's name first. A negative number is a value
+/// wherever one may stand, so that its option says what it takes.
+///
+/// # Errors
+/// What [`refuse_usage`] prints.
+pub fn parse<C: Parser>(args: impl IntoIterator<Item = OsString>) -> Result<C, clap::Error> {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let mut command = with_negative_numbers(C::command());
+    // What is named goes into JSON files, which are UTF-8.
+    if let Some(arg) = args.iter().find(|arg| arg.to_str().is_none()) {
+        let message = format!("`{}` is not UTF-8: rename it", arg.display());
+        return Err(command.error(ErrorKind::InvalidUtf8, message));
+    }
+    let mut found = command.try_get_matches_from_mut(args)?;
+    C::from_arg_matches_mut(&mut found).map_err(|error| error.format(&mut command))
+}
+
+fn with_negative_numbers(command: Command) -> Command {
+    let number = |arg: Arg| {
+        let takes = arg.get_action().takes_values();
+        arg.allow_negative_numbers(takes)
+    };
+    command
+        .mut_args(number)
+        .mut_subcommands(with_negative_numbers)
 }
 
 /// Prints what `--json` asks for, and why the command failed; returns the exit code.

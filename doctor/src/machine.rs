@@ -152,7 +152,7 @@ impl Machine<'_> {
                 "disk",
                 enough(self.disk_mb, DISK_MB),
                 free(self.disk_mb),
-                "make room, or name another folder with --out; a run takes about 10 MB",
+                "make room, or name another folder with --out; a run with its film takes 20 to 90 MB",
             ),
         ]
     }
@@ -223,10 +223,15 @@ fn said(text: &str) -> String {
     if text.is_empty() { silent } else { text }.to_owned()
 }
 
-/// Names with commas between them, or that there are none.
+/// The first names with commas between them, or that there are none.
 fn listed(names: &[String], none: &str) -> String {
-    let all = names.join(", ");
-    if all.is_empty() { none.to_owned() } else { all }
+    const SHOWN: usize = 4;
+    let shown = names.get(..SHOWN).unwrap_or(names).join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        _ if shown.is_empty() => none.to_owned(),
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
 }
 
 #[cfg(test)]

@@ -132,7 +132,7 @@ pub struct ResultArgs {
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     pub ropes: Option<u64>,
     /// Seed of the ropes, the films and the searches.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
     /// Method.
     #[arg(long, value_enum, default_value_t = MethodName::Hybrid)]
@@ -244,7 +244,7 @@ pub struct BenchArgs {
     #[arg(long)]
     pub quick: bool,
     /// Seed of the ropes and motions.
-    #[arg(long, default_value_t = 5, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, default_value_t = 5, value_parser = seed)]
     pub seed: u64,
     /// `track`: folder with video.avi, camera.toml and pose.csv or joints.csv.
     #[arg(long)]

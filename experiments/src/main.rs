@@ -20,11 +20,10 @@ mod report;
 mod results;
 mod rooms;
 
-use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = match args::Cli::try_parse() {
+    let cli: args::Cli = match cli_output::parse(std::env::args_os()) {
         Ok(cli) => cli,
         Err(e) => return cli_output::refuse_usage(&e),
     };

@@ -16,6 +16,8 @@ use xarm_sim::clock;
 
 /// Delay beyond the camera's latency at which frames are dropped (s).
 const BACKLOG_S: f64 = 0.12;
+/// Pause between two warnings of dropped frames (s).
+const WARN_EVERY_S: f64 = 10.0;
 /// Longest sleep before `stop` is looked at again.
 const PATIENCE: Duration = Duration::from_millis(50);
 
@@ -29,6 +31,8 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
         start: clock::now(),
         period_s: 1.0 / config.camera.frame_rate_hz,
         sequence: 0,
+        dropped: 0,
+        warned: None,
     };
     let blank = FrameHeader {
         version: PAYLOAD_VERSION,
@@ -104,6 +108,9 @@ struct Shutter {
     start: MonotonicNs,
     period_s: f64,
     sequence: u64,
+    /// Frames dropped since the last warning, and when that was.
+    dropped: u64,
+    warned: Option<MonotonicNs>,
 }
 
 impl Shutter {
@@ -120,11 +127,12 @@ impl Shutter {
         while now.since_s(self.opens()) > backlog_s {
             self.sequence += 1;
         }
-        if self.sequence > first {
-            tracing::warn!(
-                dropped = self.sequence - first,
-                "the simulated camera cannot keep up"
-            );
+        self.dropped += self.sequence - first;
+        let is_told = |at: MonotonicNs| now.since_s(at) < WARN_EVERY_S;
+        if self.dropped > 0 && !self.warned.is_some_and(is_told) {
+            let dropped = std::mem::take(&mut self.dropped);
+            self.warned = Some(now);
+            tracing::warn!(dropped, "the simulated camera cannot keep up");
         }
     }
 }
@@ -175,11 +183,17 @@ mod tests {
             start: MonotonicNs(1_000_000_000),
             period_s: 0.01,
             sequence: 0,
+            dropped: 0,
+            warned: None,
         };
         shutter.next(MonotonicNs(1_030_000_000), 0.1);
         assert_eq!(shutter.sequence, 1);
         shutter.next(MonotonicNs(1_255_000_000), 0.1);
         assert_eq!(shutter.sequence, 16);
         assert_eq!(shutter.opens(), MonotonicNs(1_160_000_000));
+        // What follows is counted, and told later.
+        assert_eq!(shutter.dropped, 0);
+        shutter.next(MonotonicNs(1_305_000_000), 0.1);
+        assert_eq!((shutter.sequence, shutter.dropped), (21, 4));
     }
 }

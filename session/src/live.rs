@@ -170,7 +170,7 @@ impl Session {
         }
         eprint!("\n");
         bail!(
-            "nobody typed {word} within {} s; run the command again",
+            "nobody typed {word} within {} s; run the command again, `wag run` with --from STAGE RUN from where it got to",
             within.as_secs()
         )
     }

@@ -49,7 +49,7 @@ pub struct Cli {
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub json: bool,
     /// Seed of everything random; a command without chance takes it and ignores it.
-    #[arg(long, global = true, help_heading = GLOBAL, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, global = true, help_heading = GLOBAL, value_parser = seed)]
     pub seed: Option<u64>,
     /// The cell: the pole on the arm, and what stands around it (TOML, as
     /// configs/cell/lab.toml); it contains only what differs. Default: that of the
@@ -234,7 +234,7 @@ pub struct SceneArgs {
     #[arg(long, value_name = "N", requires = "video")]
     pub part: Option<usize>,
     /// Delay of the film's clock against the motion's, as `wag track` reports it (ms).
-    #[arg(long, value_name = "MS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = offset_ms)]
+    #[arg(long, value_name = "MS", default_value_t = 0.0, value_parser = offset_ms)]
     pub film_late_ms: f64,
 }
 
@@ -298,13 +298,13 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
-    #[arg(long, allow_negative_numbers = true, value_parser = mass_kg)]
+    #[arg(long, value_parser = mass_kg)]
     pub lead_mass: Option<f64>,
     /// Length of the rope measured by tape, clamp to lead centre (m); taken to be right to 2 mm.
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = tape_length_m)]
+    #[arg(long, value_name = "M", value_parser = tape_length_m)]
     pub length: Option<f64>,
     /// Seed of the search.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
     /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
@@ -373,7 +373,7 @@ mod tests {
 
     #[test]
     fn every_command_takes_a_seed_before_or_after_its_name() {
-        let of = |args: &[&str]| Cli::try_parse_from(args);
+        let of = |args: &[&str]| cli_output::parse::<Cli>(args.iter().map(Into::into));
         let demo = |args: &[&str]| match of(args).unwrap().command {
             Command::Demo(demo) => demo.seed,
             other => panic!("{other:?}"),

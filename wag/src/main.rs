@@ -17,20 +17,10 @@ mod command;
 mod config;
 mod pipeline;
 
-use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // What is named goes into JSON files, which are UTF-8.
-    let parsed = match std::env::args_os().find(|arg| arg.to_str().is_none()) {
-        Some(arg) => Err(cli::Cli::command().error(
-            ErrorKind::InvalidUtf8,
-            format!("`{}` is not UTF-8: rename it", arg.display()),
-        )),
-        None => cli::Cli::try_parse(),
-    };
-    let cli = match parsed {
+    let cli: cli::Cli = match cli_output::parse(std::env::args_os()) {
         Ok(cli) => cli,
         Err(error) => return cli_output::refuse_usage(&error),
     };

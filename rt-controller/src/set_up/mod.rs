@@ -84,7 +84,10 @@ impl SetUp<'_> {
             &format!("xArm 7, firmware {}", version.firmware),
         );
         reported("error before", &session.error_code()?.to_string());
-        reported("reports", &self.match_layout(version.firmware)?);
+        reported(
+            "reports",
+            &self.match_layout(version.firmware, &mut warnings)?,
+        );
         reported("tool", &self.match_tool(session)?);
         reported(
             "tool speed",

@@ -20,7 +20,11 @@ impl SetUp<'_> {
     }
 
     /// Compares the size of the reports with what the firmware is known to send.
-    pub(super) fn match_layout(&self, firmware: Firmware) -> Result<String, SetUpError> {
+    pub(super) fn match_layout(
+        &self,
+        firmware: Firmware,
+        warnings: &mut Vec<String>,
+    ) -> Result<String, SetUpError> {
         // Fields may lie elsewhere in reports of another size.
         let other_size = |address: SocketAddr, found: usize, sizes: &RangeInclusive<usize>| {
             let (port, least, most) = (address.port(), sizes.start(), sizes.end());
@@ -49,9 +53,15 @@ impl SetUp<'_> {
             )),
             Ok(report) => other_size(joints, report.len(), &sizes),
             // As many clients as it takes are there: the 100 Hz report serves.
-            Err(reason) => Ok(format!(
-                "{status} bytes, as of {firmware}; no real-time report ({reason})"
-            )),
+            Err(reason) => {
+                let fallback = self.config.fallback_report_port;
+                warnings.push(format!(
+                    "no real-time report: {reason}; the joints are those that port {fallback} reports, if it does"
+                ));
+                Ok(format!(
+                    "{status} bytes, as of {firmware}; no real-time report"
+                ))
+            }
         }
     }
 }

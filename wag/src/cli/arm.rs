@@ -157,7 +157,7 @@ pub struct LatencyArgs {
     #[arg(long, value_name = "FILE")]
     pub excitation: Option<PathBuf>,
     /// Seed of the phases the motion begins with; default: the motion's own.
-    #[arg(long, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, value_parser = seed)]
     pub seed: Option<u64>,
     /// Folder for the run; it must not exist. Default: runs/TIME-latency.
     #[arg(long)]
@@ -197,7 +197,7 @@ pub struct RigArgs {
     #[arg(long, default_value = "strike", value_parser = one_of(TASKS))]
     pub task: Task,
     /// Seed of the hidden rope and the noise.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
     /// Process without which it ends.
     #[arg(long, hide = true)]
@@ -213,7 +213,7 @@ pub struct BenchArgs {
     #[arg(long)]
     pub quick: bool,
     /// Seed of the simulated rig of `record`.
-    #[arg(long, default_value_t = 5, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, default_value_t = 5, value_parser = seed)]
     pub seed: u64,
     /// `rt`, `record`: time of each contender (s).
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=86_400))]

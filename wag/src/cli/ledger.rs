@@ -21,7 +21,7 @@ pub struct LedgerArgs {
     #[arg(long, value_name = "NAME")]
     pub command: Option<String>,
     /// Only runs with this seed in their summary or plan, such as 17.
-    #[arg(long, global = true, alias = "seed-is", allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, global = true, alias = "seed-is", value_parser = seed)]
     pub seed: Option<u64>,
     /// Only runs whose plan's `trajectory_sha256` begins like this, such as 9cc7b663.
     #[arg(long, value_name = "HASH")]

@@ -37,7 +37,7 @@ pub struct PlanArgs {
     #[command(flatten)]
     pub planner: PlannerArgs,
     /// Seed of the search.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
     /// Search the durations of the throw's segments too: each up to this many times as
     /// long or as short as configured (1 to 2). 1 keeps them; default: the configuration.

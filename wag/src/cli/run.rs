@@ -45,10 +45,10 @@ pub struct RunArgs {
     #[arg(long)]
     pub tip_rgb: Option<Colour>,
     /// Mass of the lead if it was weighed (kg); fixes the absolute masses.
-    #[arg(long, allow_negative_numbers = true, value_parser = mass_kg)]
+    #[arg(long, value_parser = mass_kg)]
     pub lead_mass: Option<f64>,
     /// Length of the rope measured by tape, clamp to lead centre (m); taken to be right to 2 mm.
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = tape_length_m)]
+    #[arg(long, value_name = "M", value_parser = tape_length_m)]
     pub length: Option<f64>,
     /// Plan for this many ropes drawn from the posterior of identification.
     #[arg(long, default_value_t = 0, value_name = "K")]
@@ -57,7 +57,7 @@ pub struct RunArgs {
     #[arg(long)]
     pub accept_unconfirmed: bool,
     /// Seed of every search.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
     #[command(flatten)]
     pub arm: ArmArgs,
@@ -103,7 +103,7 @@ pub struct DemoArgs {
     pub task: Task,
     /// Seed of the hidden rope, the target, the noise and every search. When frames are taken is the
     /// machine's affair, so that two demos of one seed differ a little.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
     /// Folder for the run; it must not exist. Default: runs/TIME-demo-SEED.
     #[arg(long)]

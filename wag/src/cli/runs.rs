@@ -119,7 +119,7 @@ pub struct StudioArgs {
     #[arg(long, default_value = "strike", value_parser = one_of(TASKS))]
     pub task: Task,
     /// Seed of the simulated rig's rope and noise.
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
+    #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
     /// Folder of the runs.
     #[arg(long, value_name = "DIR", default_value = run_log::ledger::RUNS)]

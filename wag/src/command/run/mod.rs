@@ -128,6 +128,9 @@ fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
     args.out
         .as_deref()
         .map_or(Ok(()), RunFolder::refuse_existing)?;
+    // The files that a run would read: of the arm, of the camera.
+    reach_measured(&args.arm)?;
+    Scene::of_file(args.camera.calibration.as_deref()).or_input()?;
     let limits = limits(&args.arm, None)?;
     let first = entry(args, settings)?;
     let Some((trajectory, operating_mode)) = first_motion(&first, &limits, settings)? else {
@@ -138,7 +141,13 @@ fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
     };
     motion::check(None, &limits, &trajectory, operating_mode)?;
     let (name, _) = motion::words(operating_mode);
-    dry_run::tell(&args.arm, &limits, &trajectory, name).map(Some)
+    let told = dry_run::tell(&args.arm, &limits, &trajectory, name)?;
+    if matches!(first, Entry::Wiggle) {
+        println!(
+            "then it would identify the rope from the film, plan the throw and check it, move to its start pose, wait until the rope hangs still, ask again, throw, and judge by the camera"
+        );
+    }
+    Ok(Some(told))
 }
 
 /// The first motion of a run but for moves at set-up speed, where it is known.
