@@ -67,12 +67,15 @@ impl Physics {
         })
     }
 
-    /// Puts the bodies of a task around the rope.
+    /// Puts the bodies of a task around the rope, or takes them away and stops its swing.
     fn place(&mut self, placed: Placed) -> Result<(), String> {
-        let scene = placed.map_or(Scene::EMPTY, |(task, target_m)| {
-            Scene::of_task(task, target_m.into(), &self.cell)
-        });
+        let Some((task, target_m)) = placed else {
+            let still = Self::new(&self.rope, &self.cell, &self.last);
+            *self = still.map_err(|why| why.to_string())?;
+            return Ok(());
+        };
         let attach = self.cell.pole.attach_motion(&self.last.state);
+        let scene = Scene::of_task(task, target_m.into(), &self.cell);
         let placed = self.live.set_scene(&scene, &attach);
         placed.map_err(|why| {
             tracing::warn!(%why, "a body cannot stand where it is to be placed");
@@ -152,7 +155,7 @@ mod tests {
         )
         .unwrap();
         let mut moved_m: f64 = 0.0;
-        for ms in 1..=1500 {
+        for ms in 1..=1571 {
             let snapshot = physics.follow(&sample(ms)).unwrap();
             exact.advance(
                 &|t| cell.pole.attach_motion(&state(t)),
@@ -166,7 +169,16 @@ mod tests {
             moved_m = moved_m.max((got.x - 0.663).abs());
         }
         assert!(moved_m > 0.05, "the rope hardly moved: {moved_m}");
-        let far = physics.follow(&sample(1700)).unwrap_err().to_string();
+        let far = physics.follow(&sample(1771)).unwrap_err().to_string();
         assert!(far.contains("lost 0.20 s of the arm's motion"), "{far}");
+
+        // The arm rests for a moment: held now, the rope hangs still.
+        let hangs =
+            |snapshot: &Snapshot| snapshot.nodes[snapshot.nodes.len() - 1] - snapshot.nodes[0];
+        let swinging = hangs(&physics.follow(&sample(1572)).unwrap());
+        physics.place(None).unwrap();
+        let still = hangs(&physics.follow(&sample(1573)).unwrap());
+        assert!(swinging.xy().norm() > 0.01, "{swinging}");
+        assert!(still.xy().norm() < 1e-5, "{still}");
     }
 }

@@ -86,7 +86,7 @@ fn answer(request: &RigRequest, config: &RigConfig, ports: ArmPorts, record: &Re
                 Err(message) => RigEvent::Failed { message },
             }
         }
-        RigRequest::RemoveTarget => match record.place(None, PATIENCE) {
+        RigRequest::Tidy => match record.place(None, PATIENCE) {
             Ok(()) => RigEvent::Done,
             Err(message) => RigEvent::Failed { message },
         },

@@ -361,8 +361,9 @@ pub enum RigRequest {
         /// The target in the world (m).
         target_m: [f64; 3],
     },
-    /// Take away what a throw was for.
-    RemoveTarget,
+    /// Take away what a throw was for, and hold the rope until it hangs still, as somebody
+    /// does before the next run.
+    Tidy,
     /// What really happened between two instants?
     Truth {
         /// From (CLOCK_MONOTONIC, ns).

@@ -242,8 +242,8 @@ fn on_camera(
         record.tip_rgb = tip_rgb.or(colours.map(|[tip_rgb, _]| tip_rgb));
         record.target_rgb = target_rgb.or(colours.map(|[_, target_rgb]| target_rgb));
         if let Some(rig) = &rig {
-            // What an earlier run left there would be in the way.
-            session.ask(rig, &RigRequest::RemoveTarget, 5.0, |_| ())?;
+            // What an earlier run left there would be in the way, and its rope still swing.
+            session.ask(rig, &RigRequest::Tidy, 5.0, |_| ())?;
         }
         if !matches!(entry, Entry::WiggleAlone) {
             let task = inputs.task;
