@@ -17,6 +17,8 @@ const FREQUENCY_HZ: f64 = 1.3;
 const DURATION_S: f64 = 5.6;
 const RAMP_S: f64 = 2.8;
 const PHYSICS_STEP_S: f64 = 1e-4;
+/// Time of the push after which a rope swings (s).
+const PUSH_S: f64 = 0.8;
 /// Where the target hangs (m).
 const TARGET_M: [f64; 3] = [1.10, 0.0, 0.45];
 
@@ -77,6 +79,8 @@ pub struct WiggleFilm {
     camera: StereoCamera,
     frame_rate_hz: f64,
     late_s: f64,
+    /// How long it was pushed before the first frame (s).
+    pushed_s: f64,
     renderer: Renderer,
     live: LiveRope,
     next: u64,
@@ -117,14 +121,31 @@ impl WiggleFilm {
             camera,
             frame_rate_hz: config.frame_rate_hz,
             late_s,
+            pushed_s: 0.0,
             renderer,
             next: 0,
         })
     }
 
+    /// The same, with a rope that swings in its first frame: joint 6 went forth by `push_rad`
+    /// and back just before.
+    #[must_use]
+    pub fn swinging(mut self, push_rad: f64) -> Self {
+        let start = joints(self.late_s);
+        let pushed = |t_s: f64| {
+            let part = 2.0 * t_s / PUSH_S;
+            let mut q = start;
+            q[5] += push_rad * smooth_step(part) * smooth_step(2.0 - part);
+            q
+        };
+        self.live.advance(&|t_s| attach_of(pushed, t_s), PUSH_S);
+        self.pushed_s = PUSH_S;
+        self
+    }
+
     fn pose(&mut self, t_s: f64) -> ScenePose {
-        // The simulation counts from the first frame on, whose rope hangs still.
-        let first_s = self.late_s;
+        // The simulation counts from the first frame on, or from a push before it.
+        let first_s = self.late_s - self.pushed_s;
         let clamp = |since_s: f64| attach(first_s + since_s);
         self.live.advance(&clamp, t_s - first_s);
         ScenePose {

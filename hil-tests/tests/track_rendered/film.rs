@@ -20,6 +20,8 @@ pub(crate) struct Take {
     /// Frames filmed before the wiggle; between whole ones, every film meets the wiggle at
     /// another phase.
     pub(crate) still: f64,
+    /// How far joint 6 pushed the rope just before (rad).
+    pub(crate) push_rad: f64,
     /// Frames filmed, those included that do not arrive.
     pub(crate) frames: usize,
 }
@@ -51,6 +53,11 @@ impl RenderedFilm {
         let size = [2 * camera.width_px as usize, camera.height_px as usize];
         let first_s = -take.still / config.frame_rate_hz;
         let film = WiggleFilm::new(config, take.seed, take.radii_m, first_s).unwrap();
+        let film = if take.push_rad == 0.0 {
+            film
+        } else {
+            film.swinging(take.push_rad)
+        };
         let length_m = film.rope.length_m;
         let (mut frames, mut right, mut truth) = (Vec::new(), Vec::new(), Vec::new());
         for (index, frame) in film.take(take.frames).enumerate() {

@@ -22,6 +22,10 @@ const MIN_EVIDENT: [f64; 3] = [0.35, 0.12, 0.12];
 const LOST: f64 = 0.2;
 /// Nothing seen is more certain than this.
 const MAX_CONFIDENCE: f64 = 0.98;
+/// A clamp that has gone so far moves (m).
+const MOVES_M: f64 = 1e-3;
+/// Shortest time before that in which a swing shows (s).
+const WATCHED_S: f64 = 0.2;
 /// Nodes at the clamp that show the pole as much as the rope.
 const CLAMP_NODES: usize = 2;
 
@@ -90,6 +94,7 @@ pub(super) fn result(
     let confirmation = Confirmation {
         tip: quantile(reading.tips.iter().map(|[_, aside]| aside.weight), 0.5),
         second_image: testimony.map(Testimony::confirmed),
+        sway: sway(&frames, motion),
     };
     let unconfirmed = confirmation.unconfirmed(&frames);
     if !unconfirmed.is_empty() {
@@ -122,6 +127,29 @@ pub(super) fn result(
         clamp: timing::fit(&clamps, 1.0 / plane.px_per_m, predicted),
         times: TrackTimes::default(),
     })
+}
+
+/// How far the rope swings before the clamp moves: the way of the keypoint that moves
+/// furthest, as a part of the rope's length as it is seen.
+fn sway(frames: &[TrackedFrame], motion: &dyn AttachMotion) -> Option<f64> {
+    let start_m = motion.at(frames.first()?.t_s).p_m;
+    let is_before = |f: &&TrackedFrame| (motion.at(f.t_s).p_m - start_m).norm() < MOVES_M;
+    let before: Vec<&TrackedFrame> = frames.iter().take_while(is_before).collect();
+    if before.last()?.t_s - before[0].t_s < WATCHED_S {
+        return None;
+    }
+    let along = |f: &TrackedFrame| -> f64 {
+        let pairs = f.points.windows(2);
+        pairs
+            .map(|p| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1]))
+            .sum()
+    };
+    let way = |k: usize, axis: usize| {
+        let at = before.iter().filter(|f| !f.lost).map(|f| f.points[k][axis]);
+        at.clone().fold(f64::MIN, f64::max) - at.fold(f64::MAX, f64::min)
+    };
+    let ways = (0..before[0].points.len()).map(|k| way(k, 0).hypot(way(k, 1)));
+    Some(ways.fold(0.0, f64::max) / along(before[0]))
 }
 
 /// The first of some colours.
