@@ -23,8 +23,8 @@ pub fn seed(text: &str) -> Result<u64, String> {
         .map_err(|_e| "a seed is a whole number from 0 to 18446744073709551615".to_owned())
 }
 
-/// Reads the command line `args`, the program's name first. A negative number is a value
-/// wherever one may stand, so that its option says what it takes.
+/// Reads the command line `args`, the program's name first. A number with a minus before it is
+/// a value wherever one may stand, so that its option says what it takes.
 ///
 /// # Errors
 /// What [`refuse_usage`] prints.

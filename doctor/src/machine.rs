@@ -296,6 +296,14 @@ mod tests {
     }
 
     #[test]
+    fn of_many_names_the_first_are_listed() {
+        let names = ["a", "b", "c", "d", "e", "f"].map(String::from);
+        assert_eq!(listed(&names, "none"), "a, b, c, d and 2 more");
+        assert_eq!(listed(&names[..4], "none"), "a, b, c, d");
+        assert_eq!(listed(&[], "none"), "none");
+    }
+
+    #[test]
     fn each_file_is_judged_by_itself() {
         let all = findings("dev/zero =", |_| ());
         let found: Vec<_> = all.iter().map(|f| f.found.as_str()).collect();

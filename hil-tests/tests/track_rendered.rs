@@ -150,7 +150,8 @@ fn swinging(seed: u64, push_rad: f64) -> Result<(), String> {
     let take = Take {
         seed,
         radii_m: None,
-        still: 33.0,
+        // Every third rope is watched so long before, and meets the wiggle at another phase.
+        still: [5.0, 14.0, 33.0][(seed % 3) as usize],
         push_rad,
         frames: FRAMES,
     };
@@ -164,7 +165,7 @@ fn swinging(seed: u64, push_rad: f64) -> Result<(), String> {
     let told = format!("seed {seed}, {push_rad} rad: 95 % within {p95_px:.1} px, {in_doubt:?}");
     println!("{told}");
     let is_right = p95_px < 3.0 && (in_doubt.is_empty() || push_rad > 0.05);
-    let is_known = push_rad > 0.05 && !in_doubt.is_empty();
+    let is_known = push_rad > 0.05 && in_doubt.iter().any(|why| why.contains("swings"));
     if is_right || is_known {
         Ok(())
     } else {
@@ -176,11 +177,11 @@ fn swinging(seed: u64, push_rad: f64) -> Result<(), String> {
 fn a_rope_that_swings_before_the_wiggle_is_followed_or_in_doubt() {
     let long = std::env::var_os("WAG_LONG_TESTS").is_some();
     let (last, pushes_rad) = if long {
-        (233, &[0.02, 0.05, 0.1, 0.2, 0.4][..])
+        (253, &[0.02, 0.05, 0.1, 0.2, 0.4][..])
     } else {
-        (223, &[0.05, 0.3][..])
+        (243, &[0.05, 0.3][..])
     };
-    let seeds: Vec<u64> = (221..last).collect();
+    let seeds: Vec<u64> = (241..last).collect();
     let outcomes = pushes_rad
         .iter()
         .flat_map(|push_rad| for_each_seed(&seeds, |seed| swinging(seed, *push_rad)));

@@ -67,6 +67,7 @@ pub(super) fn run(config: &RigConfig, record: &Record, stop: &AtomicBool) -> Res
         publish(&publisher, header, &mut renderer, &poses, arrives)?;
         shutter.next(clock::now(), config.camera.latency_s + BACKLOG_S);
     }
+    shutter.tell();
     Ok(())
 }
 
@@ -130,8 +131,15 @@ impl Shutter {
         self.dropped += self.sequence - first;
         let is_told = |at: MonotonicNs| now.since_s(at) < WARN_EVERY_S;
         if self.dropped > 0 && !self.warned.is_some_and(is_told) {
-            let dropped = std::mem::take(&mut self.dropped);
             self.warned = Some(now);
+            self.tell();
+        }
+    }
+
+    /// Warns of the frames dropped since the last warning.
+    fn tell(&mut self) {
+        let dropped = std::mem::take(&mut self.dropped);
+        if dropped > 0 {
             tracing::warn!(dropped, "the simulated camera cannot keep up");
         }
     }
@@ -195,5 +203,7 @@ mod tests {
         assert_eq!(shutter.dropped, 0);
         shutter.next(MonotonicNs(1_305_000_000), 0.1);
         assert_eq!((shutter.sequence, shutter.dropped), (21, 4));
+        shutter.next(MonotonicNs(11_400_000_000), 0.1);
+        assert_eq!(shutter.dropped, 0);
     }
 }

@@ -52,6 +52,7 @@ mod watch;
 pub use batch::{roll_out, roll_out_in, roll_out_in_with};
 pub use error::SimulateError;
 pub use frames::{FrameTimes, NodeTrack};
+pub use kernel::GRAVITY_M_S2;
 pub use lanes::{Kernel, Precision};
 pub use live::LiveRope;
 pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};

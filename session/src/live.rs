@@ -170,7 +170,7 @@ impl Session {
         }
         eprint!("\n");
         bail!(
-            "nobody typed {word} within {} s; run the command again, `wag run` with --from STAGE RUN from where it got to",
+            "nobody typed {word} within {} s; run the command again",
             within.as_secs()
         )
     }

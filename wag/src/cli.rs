@@ -384,8 +384,8 @@ mod tests {
         let check = of(&["wag", "check", "p", "--seed", "3"]).unwrap();
         assert_eq!(check.seed, Some(3));
         for line in ["ledger --seed 3", "ledger --seed-is 3", "--seed 3 ledger"] {
-            let line = ["wag"].into_iter().chain(line.split(' '));
-            let Command::Ledger(args) = Cli::try_parse_from(line).unwrap().command else {
+            let line: Vec<&str> = ["wag"].into_iter().chain(line.split(' ')).collect();
+            let Command::Ledger(args) = of(&line).unwrap().command else {
                 panic!("another command");
             };
             assert_eq!(args.seed, Some(3));

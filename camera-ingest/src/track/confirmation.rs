@@ -1,5 +1,6 @@
 //! Whether a track may be relied on.
 
+use super::sway::Before;
 use shared_types::keypoints::TrackedFrame;
 
 /// Confidence below which a keypoint is unconfirmed.
@@ -10,10 +11,9 @@ const MAX_UNCONFIRMED: f64 = 0.25;
 const MIN_TIP: f64 = 0.25;
 /// Part of the rope that the second image must show where the first one says.
 const MIN_CONFIRMED: f64 = 0.8;
-/// Swing before the wiggle, as a part of the rope's length: the ropes that are compared with
-/// the film hang still at its beginning. Twelve ropes were followed up to 0.24, and lost from
-/// there on.
-const MAX_SWAY: f64 = 0.15;
+/// Amplitude of a swing before the wiggle: the ropes that are compared with the film hang still
+/// at its beginning. Twelve ropes were followed up to 0.17 rad and lost from 0.14 on.
+const MAX_SWAY_RAD: f64 = 0.1;
 
 /// What speaks for a track, beside its keypoints.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,9 +24,8 @@ pub(super) struct Confirmation {
     /// Part of the rope, over all frames looked at, that the second image shows where the
     /// first one says; `None` for a film of one eye.
     pub(super) second_image: Option<f64>,
-    /// How far the rope swings before the clamp moves, to and fro, as a part of its length;
-    /// `None` where too little was filmed before.
-    pub(super) sway: Option<f64>,
+    /// The part of the film in which the rope should hang still.
+    pub(super) before: Before,
 }
 
 impl Confirmation {
@@ -58,12 +57,13 @@ impl Confirmation {
                 percent(MIN_CONFIRMED)
             ));
         }
-        if let Some(part) = self.sway.filter(|part| *part > MAX_SWAY) {
+        let swung_rad = self.before.amplitude_rad(frames);
+        if let Some(swung_rad) = swung_rad.filter(|swung_rad| *swung_rad > MAX_SWAY_RAD) {
             unconfirmed.push(format!(
-                "the rope swings before the arm moves, by {} % of its length to and fro (at most \
-                 {} %): hold it until it hangs still, then film again",
-                percent(part),
-                percent(MAX_SWAY)
+                "the rope swings before the arm moves, by {:.0} degrees to either side (at most {:.0}): \
+                 hold it until it hangs still, then film again",
+                swung_rad.to_degrees(),
+                MAX_SWAY_RAD.to_degrees()
             ));
         }
         unconfirmed
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn each_reason_is_named() {
-        let unconfirmed = |weak: usize, tip, second_image, sway| {
+        let unconfirmed = |weak: usize, tip, second_image| {
             let mut confidence = vec![0.9; 100];
             confidence[..weak].fill(0.4);
             let frame = TrackedFrame {
@@ -88,22 +88,24 @@ mod tests {
             let confirmation = Confirmation {
                 tip,
                 second_image,
-                sway,
+                before: Before {
+                    until_s: 0.0,
+                    length_m: 0.5,
+                },
             };
             confirmation.unconfirmed(&[frame])
         };
-        assert!(unconfirmed(2, 0.8, Some(0.95), Some(0.01)).is_empty());
-        assert!(unconfirmed(2, 0.8, None, None).is_empty());
-        let named = unconfirmed(40, 0.1, Some(0.2), Some(0.3));
+        assert!(unconfirmed(2, 0.8, Some(0.95)).is_empty());
+        assert!(unconfirmed(2, 0.8, None).is_empty());
+        let named = unconfirmed(40, 0.1, Some(0.2));
         let words = [
             "40 % of the keypoints",
             "end is not confirmed",
             "20 % of the rope",
-            "swings before the arm moves, by 30 %",
         ];
         for (reason, word) in named.iter().zip(words) {
             assert!(reason.contains(word), "{named:?}");
         }
-        assert_eq!(named.len(), 4);
+        assert_eq!(named.len(), 3);
     }
 }

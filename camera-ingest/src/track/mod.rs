@@ -14,6 +14,7 @@ mod plane;
 mod point_tracker;
 mod refusal;
 mod scene;
+mod sway;
 mod timing;
 
 use std::time::Duration;

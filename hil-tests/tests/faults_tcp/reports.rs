@@ -5,7 +5,7 @@ use super::stand::Stand;
 use rt_controller::ControllerConfig;
 use rt_controller::config::OnDifference;
 use shared_types::FaultCode;
-use shared_types::ipc::message::ControllerRequest;
+use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
 use xarm_sim::{ArmConfig, Firmware};
@@ -166,6 +166,26 @@ fn an_arm_that_does_not_prove_to_be_simulated_is_not_driven_as_one() {
     });
     let words = ["does not prove", "simulated = true"];
     refuses_to_bring_up(&mut stand, FaultCode::ArmDiffers, &words);
+    stand.finish();
+}
+
+#[test]
+fn an_arm_without_a_real_time_report_is_brought_up_with_a_warning() {
+    let nobody = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let port = nobody.local_addr().unwrap().port();
+    drop(nobody);
+    let mut stand = Stand::ready_with("no_realtime", |config| config.report_port = port);
+    let ControllerEvent::Status { warnings, .. } = stand.ask(&ControllerRequest::Status) else {
+        panic!("no status");
+    };
+    let told = warnings.join("; ");
+    let fallback = stand.config.fallback_report_port;
+    for word in [
+        format!("no report from the arm at 127.0.0.1:{port}"),
+        format!("those that port {fallback} reports"),
+    ] {
+        assert!(told.contains(&word), "{told}");
+    }
     stand.finish();
 }
 

@@ -68,7 +68,7 @@ pub fn clear_of_arm(target_m: [f64; 3], cell: &Cell) -> Result<(), PlanError> {
 ///
 /// # Errors
 /// A target that is not finite, below the floor, or too far; the latter two with
-/// a nearby point that can be reached.
+/// a point within the bounds on its bearing: near it, or near what it would be in mm.
 pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Result<(), PlanError> {
     if target_m.iter().any(|v| !v.is_finite()) {
         return Err(PlanError::Target(format!(
@@ -96,11 +96,13 @@ pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Resul
     };
     let farthest_m = target_m.into_iter().map(f64::abs).fold(0.0, f64::max);
     let hint = unit_hint("target_m", farthest_m, radius_max);
-    // What was probably meant.
-    let [x, y, z] = target_m.map(|v| if hint.is_empty() { v } else { v / 1000.0 });
+    let near = |target_m| nearest(target_m, rho_max, radius_max, floor_z_m);
+    // Written in mm, it was probably meant so.
+    let meant_m = near(target_m.map(|v| v / 1000.0));
+    let is_meant = !hint.is_empty() && clear_of_arm(meant_m, cell).is_ok();
     Err(PlanError::Unreachable {
         target_m,
-        nearest_m: nearest([x, y, z], rho_max, radius_max, floor_z_m),
+        nearest_m: if is_meant { meant_m } else { near(target_m) },
         reason: reason + hint,
     })
 }
@@ -210,6 +212,19 @@ mod tests {
                 check_reach(nearest_m, 0.55, &cell).is_ok(),
                 "{far:?} -> {nearest_m:?}"
             );
+        }
+        // In mm, and in cm: a thousandth of that lies in the base.
+        for (written, near_m) in [
+            ([1000.0, 0.0, 400.0], [1.0, 0.0, 0.4]),
+            ([110.0, 0.0, 45.0], [1.0, 0.0, 0.8]),
+        ] {
+            let Err(PlanError::Unreachable { nearest_m, .. }) = check_reach(written, 0.55, &cell)
+            else {
+                panic!("{written:?} was accepted");
+            };
+            let off_m = (Vector3::from(nearest_m) - Vector3::from(near_m)).norm();
+            assert!(off_m < 0.3, "{written:?} -> {nearest_m:?}");
+            assert!(clear_of_arm(nearest_m, &cell).is_ok());
         }
         assert!(check_reach([1.1, 0.0, 0.45], 0.45, &cell).is_ok());
         let refusal = check_reach([f64::NAN, 0.0, 0.0], 0.5, &cell).unwrap_err();

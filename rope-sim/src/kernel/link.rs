@@ -6,7 +6,7 @@ use crate::scheme::Scheme;
 use crate::state::Link;
 
 /// Standard gravity of the model (m/s²), along -z.
-pub(crate) const GRAVITY_M_S2: f64 = 9.81;
+pub const GRAVITY_M_S2: f64 = 9.81;
 
 /// A push along +x and +y (m/s²), in single precision only. Seven orders of
 /// magnitude below gravity, it moves a tip by less than a tenth of a micrometre,

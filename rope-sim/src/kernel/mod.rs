@@ -23,7 +23,8 @@ mod link;
 mod outboard;
 
 pub(crate) use joints::spring;
-pub(crate) use link::{Elimination, GRAVITY_M_S2, centripetal, up};
+pub use link::GRAVITY_M_S2;
+pub(crate) use link::{Elimination, centripetal, up};
 
 use crate::algebra::Vec3;
 use crate::lanes::Lanes;

@@ -56,7 +56,7 @@ impl SetUp<'_> {
             Err(reason) => {
                 let fallback = self.config.fallback_report_port;
                 warnings.push(format!(
-                    "no real-time report: {reason}; the joints are those that port {fallback} reports, if it does"
+                    "{reason}; until then the joints are those that port {fallback} reports, if it does"
                 ));
                 Ok(format!(
                     "{status} bytes, as of {firmware}; no real-time report"
@@ -78,8 +78,7 @@ pub fn read_status(port: SocketAddr) -> Result<(NormalReport, Option<RichReport>
 }
 
 fn no_status<T>(address: SocketAddr, reason: impl core::fmt::Display) -> Result<T, SetUpError> {
-    let message =
-        format!("no status report from the arm at {address} ({reason}): check the report ports");
+    let message = format!("no report from the arm at {address} ({reason}): check the report ports");
     refuse(FaultCode::LinkLost, message)
 }
 

@@ -37,6 +37,7 @@ use crate::frame::ImageFrame;
 use explainer::Explainer;
 use hypothesis::Fidelity;
 pub(crate) use live::Known;
+pub(super) use statistics::median;
 use witness::Testimony;
 
 /// Frames of which both images are looked at.

@@ -6,6 +6,7 @@ use shared_types::{KeypointTrack, StereoCamera};
 
 use super::super::confirmation::{Confirmation, UNCONFIRMED};
 use super::super::plane::RopePlane;
+use super::super::sway::Before;
 use super::super::{RopeAppearance, TrackError, TrackResult, TrackTimes, timing};
 use super::colour::{CHROMA_WEIGHT, Colour};
 use super::curve::{Pixel, length};
@@ -24,8 +25,6 @@ const LOST: f64 = 0.2;
 const MAX_CONFIDENCE: f64 = 0.98;
 /// A clamp that has gone so far moves (m).
 const MOVES_M: f64 = 1e-3;
-/// Shortest time before that in which a swing shows (s).
-const WATCHED_S: f64 = 0.2;
 /// Nodes at the clamp that show the pole as much as the rope.
 const CLAMP_NODES: usize = 2;
 
@@ -91,10 +90,13 @@ pub(super) fn result(
             lost,
         });
     }
+    let at_rest = reading.places(0, NODES).0.into_iter();
+    let at_rest: Vec<Pixel> = at_rest.map(|p| plane.point_at(p.into()).into()).collect();
+    let length_m = length(&at_rest);
     let confirmation = Confirmation {
         tip: quantile(reading.tips.iter().map(|[_, aside]| aside.weight), 0.5),
         second_image: testimony.map(Testimony::confirmed),
-        sway: sway(&frames, motion),
+        before: before_motion(&frames, motion, length_m),
     };
     let unconfirmed = confirmation.unconfirmed(&frames);
     if !unconfirmed.is_empty() {
@@ -107,8 +109,6 @@ pub(super) fn result(
         let row = seen(t_s).map_or(0.0, |[_, v]| v);
         plane.point_at(seen(t_s + camera.row_time_s(row)).unwrap_or([f64::NAN; 2]))
     };
-    let at_rest = reading.places(0, NODES).0.into_iter();
-    let at_rest: Vec<Pixel> = at_rest.map(|p| plane.point_at(p.into()).into()).collect();
     let [rope_radius_m, lead_radius_m] = reading.radii_px.map(|px| px / plane.px_per_m);
     Ok(TrackResult {
         track: KeypointTrack {
@@ -119,7 +119,7 @@ pub(super) fn result(
         appearance: RopeAppearance {
             rope_radius_m,
             lead_radius_m,
-            length_m: length(&at_rest),
+            length_m,
             rope_rgb: rgb(&reading.rope),
             lead_rgb: rgb(&reading.tip),
         },
@@ -129,27 +129,16 @@ pub(super) fn result(
     })
 }
 
-/// How far the rope swings before the clamp moves: the way of the keypoint that moves
-/// furthest, as a part of the rope's length as it is seen.
-fn sway(frames: &[TrackedFrame], motion: &dyn AttachMotion) -> Option<f64> {
-    let start_m = motion.at(frames.first()?.t_s).p_m;
-    let is_before = |f: &&TrackedFrame| (motion.at(f.t_s).p_m - start_m).norm() < MOVES_M;
-    let before: Vec<&TrackedFrame> = frames.iter().take_while(is_before).collect();
-    if before.last()?.t_s - before[0].t_s < WATCHED_S {
-        return None;
+/// The time before the clamp moves.
+fn before_motion(frames: &[TrackedFrame], motion: &dyn AttachMotion, length_m: f64) -> Before {
+    let at_m = |t_s: f64| motion.at(t_s).p_m;
+    let start_m = at_m(frames.first().map_or(0.0, |f| f.t_s));
+    let moves = |f: &&TrackedFrame| (at_m(f.t_s) - start_m).norm() > MOVES_M;
+    let first = frames.iter().find(moves).or(frames.last());
+    Before {
+        until_s: first.map_or(0.0, |f| f.t_s),
+        length_m,
     }
-    let along = |f: &TrackedFrame| -> f64 {
-        let pairs = f.points.windows(2);
-        pairs
-            .map(|p| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1]))
-            .sum()
-    };
-    let way = |k: usize, axis: usize| {
-        let at = before.iter().filter(|f| !f.lost).map(|f| f.points[k][axis]);
-        at.clone().fold(f64::MIN, f64::max) - at.fold(f64::MAX, f64::min)
-    };
-    let ways = (0..before[0].points.len()).map(|k| way(k, 0).hypot(way(k, 1)));
-    Some(ways.fold(0.0, f64::max) / along(before[0]))
 }
 
 /// The first of some colours.

@@ -13,7 +13,7 @@ pub(super) fn quantile(values: impl Iterator<Item = f64>, q: f64) -> f64 {
 }
 
 /// The middle one, the greater of two; 0 for none.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+pub(in super::super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     let middle = values.len() / 2;
     ranked(&mut values, middle)

@@ -144,7 +144,7 @@ fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
     let told = dry_run::tell(&args.arm, &limits, &trajectory, name)?;
     if matches!(first, Entry::Wiggle) {
         println!(
-            "then it would identify the rope from the film, plan the throw and check it, move to its start pose, wait until the rope hangs still, ask again, throw, and judge by the camera"
+            "then it would identify the rope from the film, plan the throw and check it, turn to its start by a move that damps the swing, throw and measure by the camera; MOVE, PLACED for board or wall, and THROW are asked for, unless the arm is simulated"
         );
     }
     Ok(Some(told))
