@@ -22,7 +22,7 @@ pub enum PlanError {
     Unreachable {
         /// The target as given (m).
         target_m: [f64; 3],
-        /// A point within these bounds (m), near it or near what it would be in mm.
+        /// A point within these bounds (m), near it or what it would be in cm or mm.
         nearest_m: [f64; 3],
         /// Which bound it breaks.
         reason: String,

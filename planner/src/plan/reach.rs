@@ -68,7 +68,7 @@ pub fn clear_of_arm(target_m: [f64; 3], cell: &Cell) -> Result<(), PlanError> {
 ///
 /// # Errors
 /// A target that is not finite, below the floor, or too far; the latter two with
-/// a point within the bounds on its bearing: near it, or near what it would be in mm.
+/// a point within the bounds on its bearing: near it, or what it would be in cm or mm.
 pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Result<(), PlanError> {
     if target_m.iter().any(|v| !v.is_finite()) {
         return Err(PlanError::Target(format!(
@@ -97,12 +97,17 @@ pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Resul
     let farthest_m = target_m.into_iter().map(f64::abs).fold(0.0, f64::max);
     let hint = unit_hint("target_m", farthest_m, radius_max);
     let near = |target_m| nearest(target_m, rho_max, radius_max, floor_z_m);
-    // Written in mm, it was probably meant so.
-    let meant_m = near(target_m.map(|v| v / 1000.0));
-    let is_meant = !hint.is_empty() && clear_of_arm(meant_m, cell).is_ok();
+    // What it is if it was written in cm or in mm.
+    let meant = [100.0, 1000.0].map(|parts| target_m.map(|v| v / parts));
+    let is_free = |at: &[f64; 3]| {
+        check_reach(*at, rope_length_m, cell)
+            .and(clear_of_arm(*at, cell))
+            .is_ok()
+    };
+    let mut meant = meant.into_iter().filter(|_| !hint.is_empty());
     Err(PlanError::Unreachable {
         target_m,
-        nearest_m: if is_meant { meant_m } else { near(target_m) },
+        nearest_m: meant.find(is_free).unwrap_or_else(|| near(target_m)),
         reason: reason + hint,
     })
 }
@@ -111,15 +116,12 @@ pub fn check_reach(target_m: [f64; 3], rope_length_m: f64, cell: &Cell) -> Resul
 fn nearest([x, y, z]: [f64; 3], rho_max: f64, radius_max: f64, floor_z_m: f64) -> [f64; 3] {
     // A little inside each bound, so that the suggestion is accepted itself.
     const INSIDE: f64 = 0.98;
-    let rho = x.hypot(y);
-    let mut rho_in = rho.min(rho_max * INSIDE);
-    let mut up = z.max(floor_z_m * INSIDE) - SHOULDER_Z_M;
-    let radius = rho_in.hypot(up);
-    let part = (radius_max * INSIDE / radius.max(1e-9)).min(1.0);
-    rho_in *= part;
-    up *= part;
-    let scale = rho_in / rho.max(1e-9);
-    [x * scale, y * scale, SHOULDER_Z_M + up]
+    let (rho, up) = (x.hypot(y), z - SHOULDER_Z_M);
+    // Straight towards the shoulder first: what is far too far keeps its direction.
+    let part = (radius_max * INSIDE / rho.hypot(up).max(1e-9)).min(1.0);
+    let scale = (rho * part).min(rho_max * INSIDE) / rho.max(1e-9);
+    let z_m = (SHOULDER_Z_M + up * part).max(floor_z_m * INSIDE);
+    [x * scale, y * scale, z_m]
 }
 
 #[cfg(test)]
@@ -213,18 +215,20 @@ mod tests {
                 "{far:?} -> {nearest_m:?}"
             );
         }
-        // In mm, and in cm: a thousandth of that lies in the base.
-        for (written, near_m) in [
-            ([1000.0, 0.0, 400.0], [1.0, 0.0, 0.4]),
-            ([110.0, 0.0, 45.0], [1.0, 0.0, 0.8]),
+        // In mm, in cm, and in nothing that can be meant.
+        for (written, meant_m) in [
+            ([1000.0, 0.0, 400.0], Some([1.0, 0.0, 0.4])),
+            ([110.0, 0.0, 45.0], Some([1.1, 0.0, 0.45])),
+            ([1e6, 0.0, 4e5], None),
         ] {
             let Err(PlanError::Unreachable { nearest_m, .. }) = check_reach(written, 0.55, &cell)
             else {
                 panic!("{written:?} was accepted");
             };
-            let off_m = (Vector3::from(nearest_m) - Vector3::from(near_m)).norm();
-            assert!(off_m < 0.3, "{written:?} -> {nearest_m:?}");
-            assert!(clear_of_arm(nearest_m, &cell).is_ok());
+            let is_free = check_reach(nearest_m, 0.55, &cell).and(clear_of_arm(nearest_m, &cell));
+            assert!(is_free.is_ok(), "{written:?} -> {nearest_m:?}");
+            let near = |m: [f64; 3]| (Vector3::from(nearest_m) - Vector3::from(m)).norm() < 1e-9;
+            assert!(meant_m.is_none_or(near), "{written:?} -> {nearest_m:?}");
         }
         assert!(check_reach([1.1, 0.0, 0.45], 0.45, &cell).is_ok());
         let refusal = check_reach([f64::NAN, 0.0, 0.0], 0.5, &cell).unwrap_err();
