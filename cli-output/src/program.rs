@@ -40,6 +40,7 @@ pub fn parse<C: Parser>(args: impl IntoIterator<Item = OsString>) -> Result<C, c
     C::from_arg_matches_mut(&mut found).map_err(|error| error.format(&mut command))
 }
 
+/// Without it `-1` is taken for an option of that name, and refused as an unknown one.
 fn with_negative_numbers(command: Command) -> Command {
     let number = |arg: Arg| {
         let takes = arg.get_action().takes_values();

@@ -150,7 +150,7 @@ fn swinging(seed: u64, push_rad: f64) -> Result<(), String> {
     let take = Take {
         seed,
         radii_m: None,
-        // Every third rope is watched so long before, and meets the wiggle at another phase.
+        // Some are filmed briefly before, some longer, and each meets the wiggle at another phase.
         still: [5.0, 14.0, 33.0][(seed % 3) as usize],
         push_rad,
         frames: FRAMES,
