@@ -10,6 +10,8 @@ pub fn unit_hint(name: &str, value: f64, most: f64) -> &'static str {
         "; is it in degrees?"
     } else if ends("_m_s") {
         "; is it in mm/s?"
+    } else if ends("_m") && value.abs() / 100.0 <= most {
+        "; is it in cm or mm?"
     } else if ends("_m") {
         "; is it in mm?"
     } else if ends("_kg") {

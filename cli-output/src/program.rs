@@ -132,8 +132,14 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 /// # Errors
 /// When the signals are watched for already or the system refuses.
 pub fn watch_interrupts() -> anyhow::Result<()> {
-    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::SeqCst))
-        .context("cannot watch for Ctrl-C")
+    ctrlc::set_handler(|| {
+        let is_first = !INTERRUPTED.swap(true, Ordering::SeqCst);
+        // Whoever pressed it sees nothing else until what moves stands and what runs has ended.
+        if is_first && std::io::stderr().is_terminal() {
+            eprintln!("\ninterrupted: ending in order, which takes some seconds");
+        }
+    })
+    .context("cannot watch for Ctrl-C")
 }
 
 /// Whether Ctrl-C or SIGTERM has come.

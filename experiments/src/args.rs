@@ -63,7 +63,7 @@ pub enum ResultCommand {
     MotionFidelity(ResultArgs),
     /// Error of planned strikes: true, identified and random parameters.
     SimPipeline(ResultArgs),
-    /// Success of lobs and drapes planned with identified parameters.
+    /// Success of lobs and drapes planned with identified parameters, leads weighed and not.
     LobDrape(ResultArgs),
     /// Robust strikes compared with plain ones, and the coverage of their forecasts.
     Robust(ResultArgs),
@@ -126,7 +126,7 @@ pub struct RealDloArgs {
 #[derive(Debug, Args)]
 pub struct ResultArgs {
     /// Simulated ropes; default: 1000, for sim-pipeline 100, for wiggle-ablation 24 with
-    /// each wiggle, for lob-drape its own 24, for robust 200,
+    /// each wiggle, for lob-drape 30, for robust 200,
     /// for parameter-importance 30, for sensitivity-maps 8, for other-reality 20 with each
     /// channel, for full-pipeline 30 (motion-fidelity has its own).
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]

@@ -134,7 +134,16 @@ fn results_of_planning_are_whole_and_kept() {
     assert_eq!(first["rows"], report(&pipeline)["rows"]);
     let tasks = report(&format!("lob-drape --ropes 1 --out {}", at("both.json")));
     assert_eq!(tasks["trials"].as_array().unwrap().len(), 1);
-    assert!(tasks["trials"][0]["drape"]["error_m"].as_f64().unwrap() < 0.2);
+    for (row, estimate) in ["weighed", "unweighed"].into_iter().enumerate() {
+        let drape = &tasks["trials"][0][estimate]["drape"];
+        assert!(drape["error_m"].as_f64().unwrap() < 0.2, "{drape}");
+        let rate = &tasks["rows"][row]["drape_success"];
+        assert_eq!(
+            rate["true"] == 1,
+            drape["verdict"]["success"] == true,
+            "{rate}"
+        );
+    }
     let robust = report("robust --ropes 1");
     let rows = robust["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 2);

@@ -148,7 +148,7 @@ impl Process {
             && job.last_frame.elapsed().as_secs_f64() > CAMERA_SILENT_S
         {
             let silent = "no camera frame arrived for 2 s; check that the camera (or the rig) runs in \
-                          this domain";
+                          this domain, and that the machine is not too busy for it";
             answer(&job.call, &failed(silent));
             self.job = None;
         }

@@ -9,8 +9,9 @@ pub enum FiguresCommand {
     /// Run studies with seeds that follow from the commit, and keep their figures.
     ///
     /// Studies: strike, lob, drape, strike-loaded (throws of `wag demo`, the last with eight busy
-    /// threads beside it), two-terminals (`wag run` in front of a `wag rig`), sim-pipeline, lob-drape, full-pipeline, sysid, sysid-nn, sysid-ood,
-    /// wiggle-ablation, motion-fidelity (the results of these names). All take hours; an interrupted
+    /// threads beside it), two-terminals (`wag run` in front of a `wag rig`), sim-pipeline, lob-drape, full-pipeline, sysid, sysid-ood,
+    /// wiggle-ablation, motion-fidelity, robust, parameter-importance (the results of these names), sysid-nn,
+    /// lob-drape-nn, lob-drape-cmaes (the same by the paper's methods). All take hours; an interrupted
     /// one goes on where it was. Nothing else should run on the machine, and sources that differ
     /// from their commit are refused.
     Make(MakeFiguresArgs),
@@ -45,7 +46,7 @@ pub struct MakeFiguresArgs {
 #[derive(Debug, Args)]
 pub struct FillFiguresArgs {
     /// Documents with blocks of figures.
-    #[arg(value_name = "FILE", default_values = ["README.md", "docs/src/figures.md"])]
+    #[arg(value_name = "FILE", default_values = ["README.md", "docs/src/figures.md", "docs/src/numbers.md", "docs/src/planning.md"])]
     pub documents: Vec<PathBuf>,
     /// Folder of the figures.
     #[arg(long, value_name = "DIR", default_value = "docs/figures")]

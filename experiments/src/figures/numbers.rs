@@ -1,6 +1,6 @@
 //! What the rows of a study add up to, with confidence limits.
 
-use experiments::trials::{mean, quantile, wilson};
+use experiments::trials::{Rate, mean, quantile};
 use serde_json::{Map, Value, json};
 
 /// Of `n` rows, by field: of numbers their spread, with 95 % limits of the median; of truths how
@@ -21,7 +21,7 @@ pub fn of_rows(rows: &[Value]) -> Map<String, Value> {
         if !numbers.is_empty() {
             all.insert(name.clone(), spread(&numbers));
         } else if !truths.is_empty() {
-            all.insert(name.clone(), rate(&truths));
+            all.insert(name.clone(), json!(Rate::of(truths)));
         }
     }
     all
@@ -52,12 +52,6 @@ fn median_ranks(n: usize) -> (usize, usize) {
         probability *= (n - rank) as f64 / (rank + 1) as f64;
     }
     (0, n.saturating_sub(1))
-}
-
-fn rate(truths: &[bool]) -> Value {
-    let (n, hits) = (truths.len(), truths.iter().filter(|t| **t).count());
-    let [rate, low, high] = wilson(hits, n);
-    json!({"n": n, "true": hits, "false": n - hits, "rate": rate, "low": low, "high": high})
 }
 
 #[cfg(test)]

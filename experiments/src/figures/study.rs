@@ -29,7 +29,7 @@ pub enum Program {
 }
 
 /// All studies. A new one goes to the end: the place of a study gives its seeds.
-pub const STUDIES: [Study; 13] = [
+pub const STUDIES: [Study; 17] = [
     throws("strike", &["demo", "--task", "strike"], 100, 0),
     throws("lob", &["demo", "--task", "lob"], 30, 0),
     throws("drape", &["demo", "--task", "drape"], 30, 0),
@@ -46,6 +46,10 @@ pub const STUDIES: [Study; 13] = [
         program: Program::WagBesideRig,
         ..throws("two-terminals", &["run", "strike", "--yes"], 10, 0)
     },
+    once("lob-drape-nn", &["lob-drape", "--method", "nn"]),
+    once("lob-drape-cmaes", &["lob-drape", "--method", "cmaes"]),
+    once("robust", &["robust"]),
+    once("parameter-importance", &["parameter-importance"]),
 ];
 
 const fn throws(name: &'static str, args: &'static [&'static str], runs: u64, load: u16) -> Study {

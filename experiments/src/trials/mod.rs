@@ -5,7 +5,7 @@
 mod statistics;
 mod summary;
 
-pub use statistics::{Spread, area_under_curve, mean, quantile, wilson};
+pub use statistics::{Rate, Spread, area_under_curve, mean, quantile, wilson};
 pub use summary::{PAPER, ParameterRow, RatioRow, SysidSummary, summarise};
 
 use planner::observation::{Observation, ObservedPoints};

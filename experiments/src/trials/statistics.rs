@@ -53,6 +53,51 @@ pub fn wilson(hits: usize, n: usize) -> [f64; 3] {
     [part, limit(centre - spread), limit(centre + spread)]
 }
 
+/// How often something was so, with 95 % limits after Wilson.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Rate {
+    /// How many there were.
+    pub n: usize,
+    /// Of how many it was so.
+    #[serde(rename = "true")]
+    pub hits: usize,
+    /// Of how many not.
+    #[serde(rename = "false")]
+    pub others: usize,
+    /// The part of which it was so.
+    pub rate: f64,
+    /// Its lower limit.
+    pub low: f64,
+    /// Its upper limit.
+    pub high: f64,
+}
+
+impl Rate {
+    /// Of these.
+    #[must_use]
+    pub fn of(truths: impl IntoIterator<Item = bool>) -> Self {
+        let (n, hits) = truths.into_iter().fold((0, 0), |(n, hits), truth| {
+            (n + 1, hits + usize::from(truth))
+        });
+        let [rate, low, high] = wilson(hits, n);
+        Self {
+            n,
+            hits,
+            others: n - hits,
+            rate,
+            low,
+            high,
+        }
+    }
+}
+
+impl core::fmt::Display for Rate {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let [low, high] = [self.low, self.high].map(|part| 100.0 * part);
+        write!(f, "{} of {} ({low:.0} to {high:.0} %)", self.hits, self.n)
+    }
+}
+
 /// How errors spread (m).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {

@@ -144,7 +144,8 @@ mod tests {
                 .to_string()
         };
         assert!(said([1000.0, 0.0, 400.0]).contains("is it in mm?"));
-        assert!(!said([1.7, 0.0, 0.4]).contains("is it in mm?"));
+        assert!(said([85.0, 0.0, 20.0]).contains("is it in cm or mm?"));
+        assert!(!said([1.7, 0.0, 0.4]).contains("is it in"));
     }
 
     #[test]

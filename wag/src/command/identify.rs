@@ -60,7 +60,7 @@ impl Observed {
         unconfirmed.extend(kept.filter_map(|why| why.as_str().map(str::to_owned)));
         confirm(&unconfirmed, accepted, &look).or_failed()?;
         let [rope_radius_m, lead_radius_m] = film.radii_m;
-        Ok(Self {
+        let observed = Self {
             appearance: Appearance {
                 rope_radius_m,
                 lead_radius_m,
@@ -72,7 +72,9 @@ impl Observed {
             camera,
             motion: clamp.attach().or_input()?,
             warnings: other_pole(&clamp, method).into_iter().collect(),
-        })
+        };
+        observed.warn();
+        Ok(observed)
     }
 
     /// Tells a person what is poor about it.
@@ -128,9 +130,7 @@ fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
                 ));
             }
             let camera = args.scene.camera.as_deref();
-            let observed = Observed::of_run(path, camera, (method, args.accept_unconfirmed))?;
-            observed.warn();
-            return Ok(observed);
+            return Observed::of_run(path, camera, (method, args.accept_unconfirmed));
         }
         let camera = args.scene.camera().or_input()?;
         let clamp = named_motion(&args.scene).or_input()?;
@@ -280,7 +280,6 @@ pub fn again(
     let method = options.method;
     let net = method.asks_network().then(|| network(None)).transpose()?;
     let observed = Observed::of_run(run, None, (method, accept_unconfirmed))?;
-    observed.warn();
     let stage = Stage::begin("identify");
     let estimate = observed.estimate(options, net.as_ref(), &stage)?;
     stage.done(&format!("residual {:.2} px", estimate.residual_px));

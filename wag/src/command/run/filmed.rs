@@ -73,6 +73,9 @@ impl Run<'_> {
             }
             Err(lost) => return Err(lost),
         };
+        if dropped > frames / 10 {
+            tracing::warn!("{dropped} frames dropped: the film tells less; is the machine busy?");
+        }
         Ok(Film {
             first_stamp_ns,
             frames,
