@@ -23,6 +23,14 @@ const LEAD_RADIUS_M: f64 = 0.025;
 /// Of a domino that has fallen.
 const TILT_RAD: f64 = 1.0;
 
+/// A lead that hides the domino.
+#[derive(Clone, Copy)]
+struct Hides {
+    from_s: f64,
+    /// From the domino's middle towards its foot: so much shows at its top (m).
+    aside_m: f64,
+}
+
 /// A tip that goes from where it hangs to `end_m` by a way above both.
 fn tip(end_m: Vector3<f64>, t_s: f64) -> Vector3<f64> {
     let start_m = Vector3::new(0.62, 0.0, -0.2);
@@ -32,13 +40,13 @@ fn tip(end_m: Vector3<f64>, t_s: f64) -> Vector3<f64> {
 }
 
 /// Films a throw whose tip ends at a place of the target's frame; the domino falls at 0.8 s, if
-/// it does, and from 1.4 s on the tip hangs before it, if it `hides` it.
+/// it does, and the tip hangs before it at last, if it hides it.
 fn film(
     task: Task,
     target_m: [f64; 3],
     end_m: [f64; 3],
     falls: bool,
-    hides: bool,
+    hides: Option<Hides>,
     seed: u64,
 ) -> SeenThrow {
     let config: CameraConfig = RigConfig::default().seeing(task).camera;
@@ -57,12 +65,13 @@ fn film(
         .map(|index| {
             let t_s = f64::from(index) / RATE_HZ;
             renderer.lean_domino(if falls && t_s > 0.8 { TILT_RAD } else { 0.0 });
-            let at = match scene.domino.filter(|_| hides && t_s > 1.4) {
-                Some(domino) => {
+            let at = match scene.domino.zip(hides.filter(|hides| t_s > hides.from_s)) {
+                Some((domino, hides)) => {
                     let (s, c) = domino.facing_rad.sin_cos();
                     let (out, up) = if falls { TILT_RAD } else { 0.0 }.sin_cos();
                     let up = [c * out, s * out, up];
-                    let middle_m = Vector3::from(domino.foot_m) + 0.025 * Vector3::from(up);
+                    let up_m = 0.025 - hides.aside_m;
+                    let middle_m = Vector3::from(domino.foot_m) + up_m * Vector3::from(up);
                     middle_m + 0.04 * (camera.p_w_cam_m - middle_m).normalize()
                 }
                 None => tip(end_m, t_s + config.exposure_s / 2.0),
@@ -111,7 +120,7 @@ fn a_tip_on_the_board_and_a_domino_are_seen_at_every_bearing() {
         let target_m = [0.85 * c, 0.85 * s, 0.10 + 0.05 * seed as f64];
         for falls in [false, true] {
             let local_m = [0.03, 0.02, LEAD_RADIUS_M];
-            let seen = film(Task::Lob, target_m, local_m, falls, false, seed);
+            let seen = film(Task::Lob, target_m, local_m, falls, None, seed);
             let end_m = Vector3::from(TaskFrame::at(target_m).point(local_m));
             let told = format!("seed {seed}, falls {falls}: {:?}", worst_m(&seen, end_m));
             assert_eq!(seen.domino_down, Some(falls), "{told}");
@@ -126,11 +135,32 @@ fn a_tip_on_the_board_and_a_domino_are_seen_at_every_bearing() {
 /// One that fell before stays down; whether one that stood still does is not known.
 #[test]
 fn a_domino_that_the_lead_hides_at_last_is_judged_by_what_was_seen_before() {
+    let hides = Hides {
+        from_s: 1.4,
+        aside_m: 0.0,
+    };
     for seed in [4, 5, 6] {
         for falls in [false, true] {
             let target_m = [0.85, 0.0, 0.3];
             let end_m = [0.03, 0.02, LEAD_RADIUS_M];
-            let seen = film(Task::Lob, target_m, end_m, falls, true, seed);
+            let seen = film(Task::Lob, target_m, end_m, falls, Some(hides), seed);
+            assert_eq!(seen.domino_down, falls.then_some(true), "seed {seed}");
+        }
+    }
+}
+
+/// It comes to lie on what it fells, of which only an end shows then.
+#[test]
+fn a_domino_that_shows_an_end_beside_the_lead_has_fallen() {
+    let hides = Hides {
+        from_s: 0.75,
+        aside_m: 0.012,
+    };
+    for seed in [8, 9, 10] {
+        for falls in [false, true] {
+            let target_m = [0.85, 0.0, 0.2];
+            let end_m = [0.03, 0.02, LEAD_RADIUS_M];
+            let seen = film(Task::Lob, target_m, end_m, falls, Some(hides), seed);
             assert_eq!(seen.domino_down, falls.then_some(true), "seed {seed}");
         }
     }
@@ -142,7 +172,7 @@ fn a_tip_behind_the_wall_is_seen_hanging() {
         let (s, c) = bearing_deg.to_radians().sin_cos();
         let target_m = [0.75 * c, 0.75 * s, 0.3];
         let local_m = [0.01 + LEAD_RADIUS_M, 0.0, -0.25];
-        let seen = film(Task::Drape, target_m, local_m, false, false, seed);
+        let seen = film(Task::Drape, target_m, local_m, false, None, seed);
         let end_m = Vector3::from(TaskFrame::at(target_m).point(local_m));
         let [along_m, across_m] = worst_m(&seen, end_m);
         assert!(

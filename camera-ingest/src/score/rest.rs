@@ -31,8 +31,11 @@ const COVERED: f64 = 0.4;
 const MIN_SAMPLES: usize = 6;
 /// Part of its samples that keep its colour as long as it stands.
 const STANDS: f64 = 0.5;
-/// New samples of its colour, as a part of those it had, that show where it lies.
+/// New samples of its colour, as a part of those it had, that show where it lies: of one that has
+/// partly left its place, and of one that has left it but for so much, which the lead may hide.
 const LIES: f64 = 0.25;
+const LIES_HIDDEN: f64 = 0.08;
+const LEFT: f64 = 0.15;
 
 /// Looks for tip and domino in all frames; `from_ns` is the begin of the throw
 /// (CLOCK_MONOTONIC).
@@ -128,13 +131,14 @@ fn has_fallen(
             }
         }
     }
-    let part = |samples: usize| samples as f64 / seen as f64;
     if seen < MIN_SAMPLES {
         return None;
     }
-    match part(kept) >= STANDS {
+    let [kept, beside] = [kept, beside].map(|samples| samples as f64 / seen as f64);
+    let lies = if kept < LEFT { LIES_HIDDEN } else { LIES };
+    match kept >= STANDS {
         true => Some(false),
-        false => (part(beside) >= LIES).then_some(true),
+        false => (beside >= lies).then_some(true),
     }
 }
 

@@ -99,7 +99,9 @@ fn an_arming_wants_a_fresh_confirmation_given_to_an_arm_at_rest() {
     assert_eq!(stand.ask(&arming), ControllerEvent::Done);
     stand.rest(Duration::from_millis(2500));
     let swing = stand.swing_here();
-    assert_eq!(stand.refused(&swing).0, FaultCode::NotArmed);
+    let (fault, message) = stand.refused(&swing);
+    assert_eq!(fault, FaultCode::ArmingExpired);
+    assert!(message.contains("ran out"), "{message}");
     stand.finish();
 }
 

@@ -70,13 +70,15 @@ impl Bridge {
             self.wrong_mode(call, ARMING);
             return None;
         }
-        if self.operating_mode.is_none() {
-            refuse(call, FaultCode::NotArmed, "");
-        } else if let Err(why) = self.switch_held() {
-            refuse(call, FaultCode::NotArmed, &why);
-            return None;
-        }
-        self.operating_mode
+        let refused = match self.armed {
+            Ok(armed) => match self.switch_held() {
+                Ok(()) => return Some(armed),
+                Err(why) => (FaultCode::NotArmed, why),
+            },
+            Err(fault) => (fault, String::new()),
+        };
+        refuse(call, refused.0, &refused.1);
+        None
     }
 
     /// Refuses a wiggle or a throw of an arm that has moved since the area was confirmed clear.

@@ -93,7 +93,8 @@ pub struct Bridge {
     arm_error: ErrorCode,
     open: Vec<Open>,
     uploads: Uploads,
-    operating_mode: Option<OperatingMode>,
+    /// For what the arm is armed, or why it is not.
+    armed: Result<OperatingMode, FaultCode>,
     /// When the arm last came to rest (CLOCK_MONOTONIC, ns).
     at_rest_ns: u64,
     /// When the area was confirmed clear for what is armed (CLOCK_MONOTONIC, ns).
@@ -143,7 +144,7 @@ impl Bridge {
             arm_error: ErrorCode::NONE,
             open: Vec::new(),
             uploads: Uploads::default(),
-            operating_mode: None,
+            armed: Err(FaultCode::NotArmed),
             at_rest_ns: 0,
             confirmed_ns: None,
             last_id: 0,
@@ -317,7 +318,7 @@ impl Bridge {
             }
             ControlEvent::Armed(arming) => {
                 tracing::info!(?arming, "armed");
-                self.operating_mode = Some(arming.operating_mode);
+                self.armed = Ok(arming.operating_mode);
                 for open in self.take(|awaits| matches!(awaits, Awaited::Armed)) {
                     answer(&open.call, &ControllerEvent::Done);
                 }
@@ -330,7 +331,10 @@ impl Bridge {
             }
             ControlEvent::Disarmed { fault } => {
                 tracing::info!(?fault, "disarmed");
-                self.operating_mode = None;
+                self.armed = Err(match fault {
+                    FaultCode::ArmingExpired => fault,
+                    _ => FaultCode::NotArmed,
+                });
             }
         }
     }

@@ -67,7 +67,7 @@ impl Bridge {
             ControllerRequest::Disarm => match self.command(ControlCommand::Disarm, None) {
                 Ok(()) => {
                     // With its next cycle.
-                    self.operating_mode = None;
+                    self.armed = Err(FaultCode::NotArmed);
                     answer(&call, &ControllerEvent::Done);
                 }
                 Err(fault) => refuse(&call, fault, "the control loop takes no commands"),
@@ -112,7 +112,7 @@ impl Bridge {
                 fault: FaultCode::from_raw(self.newest.fault).unwrap_or_default(),
                 arm_error: self.arm_error.0,
                 q_c: self.newest.q_c,
-                operating_mode: self.operating_mode,
+                operating_mode: self.armed.ok(),
                 warnings: [&self.warnings[..], &self.arm_warnings].concat(),
             },
         );
