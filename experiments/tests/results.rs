@@ -137,6 +137,8 @@ fn results_of_planning_are_whole_and_kept() {
     for (row, estimate) in ["weighed", "unweighed"].into_iter().enumerate() {
         let drape = &tasks["trials"][0][estimate]["drape"];
         assert!(drape["error_m"].as_f64().unwrap() < 0.2, "{drape}");
+        let lob = &tasks["trials"][0][estimate]["lob"];
+        assert_eq!(lob["verdict"]["success"], true, "{lob}");
         let rate = &tasks["rows"][row]["drape_success"];
         assert_eq!(
             rate["true"] == 1,

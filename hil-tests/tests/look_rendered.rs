@@ -20,8 +20,8 @@ const FRAMES: u32 = 126;
 const LEAVES_S: f64 = 0.2;
 const RESTS_S: f64 = 0.9;
 const LEAD_RADIUS_M: f64 = 0.025;
-/// Of a domino that has fallen.
-const TILT_RAD: f64 = 1.0;
+/// Of a domino that has fallen, away from the arm or towards it.
+const TILTS_RAD: [f64; 2] = [1.5, -1.5];
 
 /// A lead that hides the domino.
 #[derive(Clone, Copy)]
@@ -39,13 +39,13 @@ fn tip(end_m: Vector3<f64>, t_s: f64) -> Vector3<f64> {
     start_m + (end_m - start_m) * u + Vector3::z() * arc_m
 }
 
-/// Films a throw whose tip ends at a place of the target's frame; the domino falls at 0.8 s, if
-/// it does, and the tip hangs before it at last, if it hides it.
+/// Films a throw whose tip ends at a place of the target's frame; the domino falls by an angle at
+/// 0.8 s, and the tip hangs before it at last, if it hides it.
 fn film(
     task: Task,
     target_m: [f64; 3],
     end_m: [f64; 3],
-    falls: bool,
+    falls_rad: f64,
     hides: Option<Hides>,
     seed: u64,
 ) -> SeenThrow {
@@ -64,11 +64,11 @@ fn film(
     let mut frames: Vec<StereoFrame> = (0..FRAMES)
         .map(|index| {
             let t_s = f64::from(index) / RATE_HZ;
-            renderer.lean_domino(if falls && t_s > 0.8 { TILT_RAD } else { 0.0 });
+            renderer.lean_domino(if t_s > 0.8 { falls_rad } else { 0.0 });
             let at = match scene.domino.zip(hides.filter(|hides| t_s > hides.from_s)) {
                 Some((domino, hides)) => {
                     let (s, c) = domino.facing_rad.sin_cos();
-                    let (out, up) = if falls { TILT_RAD } else { 0.0 }.sin_cos();
+                    let (out, up) = falls_rad.sin_cos();
                     let up = [c * out, s * out, up];
                     let up_m = 0.025 - hides.aside_m;
                     let middle_m = Vector3::from(domino.foot_m) + up_m * Vector3::from(up);
@@ -118,11 +118,15 @@ fn a_tip_on_the_board_and_a_domino_are_seen_at_every_bearing() {
     for (seed, bearing_deg) in [(1_u64, -20.0_f64), (2, 0.0), (3, 20.0)] {
         let (s, c) = bearing_deg.to_radians().sin_cos();
         let target_m = [0.85 * c, 0.85 * s, 0.10 + 0.05 * seed as f64];
-        for falls in [false, true] {
+        for falls_rad in [[0.0].as_slice(), &TILTS_RAD].concat() {
+            let falls = falls_rad != 0.0;
             let local_m = [0.03, 0.02, LEAD_RADIUS_M];
-            let seen = film(Task::Lob, target_m, local_m, falls, None, seed);
+            let seen = film(Task::Lob, target_m, local_m, falls_rad, None, seed);
             let end_m = Vector3::from(TaskFrame::at(target_m).point(local_m));
-            let told = format!("seed {seed}, falls {falls}: {:?}", worst_m(&seen, end_m));
+            let told = format!(
+                "seed {seed}, falls {falls_rad} rad: {:?}",
+                worst_m(&seen, end_m)
+            );
             assert_eq!(seen.domino_down, Some(falls), "{told}");
             let [along_m, across_m] = worst_m(&seen, end_m);
             assert!(along_m < 0.04 && across_m < 0.012, "{told}");
@@ -140,11 +144,16 @@ fn a_domino_that_the_lead_hides_at_last_is_judged_by_what_was_seen_before() {
         aside_m: 0.0,
     };
     for seed in [4, 5, 6] {
-        for falls in [false, true] {
+        for falls_rad in [[0.0].as_slice(), &TILTS_RAD].concat() {
+            let falls = falls_rad != 0.0;
             let target_m = [0.85, 0.0, 0.3];
             let end_m = [0.03, 0.02, LEAD_RADIUS_M];
-            let seen = film(Task::Lob, target_m, end_m, falls, Some(hides), seed);
-            assert_eq!(seen.domino_down, falls.then_some(true), "seed {seed}");
+            let seen = film(Task::Lob, target_m, end_m, falls_rad, Some(hides), seed);
+            assert_eq!(
+                seen.domino_down,
+                falls.then_some(true),
+                "seed {seed}, {falls_rad} rad"
+            );
         }
     }
 }
@@ -157,11 +166,16 @@ fn a_domino_that_shows_an_end_beside_the_lead_has_fallen() {
         aside_m: 0.012,
     };
     for seed in [8, 9, 10] {
-        for falls in [false, true] {
+        for falls_rad in [[0.0].as_slice(), &TILTS_RAD].concat() {
+            let falls = falls_rad != 0.0;
             let target_m = [0.85, 0.0, 0.2];
             let end_m = [0.03, 0.02, LEAD_RADIUS_M];
-            let seen = film(Task::Lob, target_m, end_m, falls, Some(hides), seed);
-            assert_eq!(seen.domino_down, falls.then_some(true), "seed {seed}");
+            let seen = film(Task::Lob, target_m, end_m, falls_rad, Some(hides), seed);
+            assert_eq!(
+                seen.domino_down,
+                falls.then_some(true),
+                "seed {seed}, {falls_rad} rad"
+            );
         }
     }
 }
@@ -172,7 +186,7 @@ fn a_tip_behind_the_wall_is_seen_hanging() {
         let (s, c) = bearing_deg.to_radians().sin_cos();
         let target_m = [0.75 * c, 0.75 * s, 0.3];
         let local_m = [0.01 + LEAD_RADIUS_M, 0.0, -0.25];
-        let seen = film(Task::Drape, target_m, local_m, false, None, seed);
+        let seen = film(Task::Drape, target_m, local_m, 0.0, None, seed);
         let end_m = Vector3::from(TaskFrame::at(target_m).point(local_m));
         let [along_m, across_m] = worst_m(&seen, end_m);
         assert!(

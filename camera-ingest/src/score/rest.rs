@@ -25,13 +25,14 @@ const DOMINO_FRAMES: usize = 15;
 const DOMINO_EVERY: usize = 5;
 /// Around the domino's projection: what a calibration is off by, and more (px).
 const WINDOW_PX: f64 = 22.0;
-/// Coverage from which a sample shows the domino.
-const COVERED: f64 = 0.4;
-/// Samples of it in both images that make it visible.
-const MIN_SAMPLES: usize = 6;
-/// Part of its samples that keep its colour as long as it stands.
+/// Coverage of a sample, or change of it, that is more than noise: one that lies flat is hardly
+/// thicker than a pixel.
+const FAINT: f64 = 0.15;
+/// Samples in both images that it must cover to be visible.
+const MIN_AREA: f64 = 4.0;
+/// Part of its area that keeps its colour as long as it stands.
 const STANDS: f64 = 0.5;
-/// New samples of its colour, as a part of those it had, that show where it lies: of one that has
+/// New area of its colour, as a part of what it had, that shows where it lies: of one that has
 /// partly left its place, and of one that has left it but for so much, which the lead may hide.
 const LIES: f64 = 0.25;
 const LIES_HIDDEN: f64 = 0.08;
@@ -110,11 +111,11 @@ fn has_fallen(
     shown: &VecDeque<[ImageFrame; 2]>,
 ) -> Option<bool> {
     let wanted = chroma_of_rgb(domino.rgb);
-    let (mut seen, mut kept, mut beside) = (0_usize, 0_usize, 0_usize);
+    let (mut seen, mut kept, mut beside) = (0.0, 0.0, 0.0);
     for (k, image) in scene.images.iter().enumerate() {
-        let covers = |cb: u8, cr: u8| {
+        let covered = |cb: u8, cr: u8| {
             let sample = [cb, cr].map(|c| f64::from(c) - 128.0);
-            coverage(sample, scene.middles[k], wanted) > COVERED
+            coverage(sample, scene.middles[k], wanted)
         };
         let median = |plane: fn(&ImageFrame) -> &[u8], at: usize| {
             let mut values: Vec<u8> = shown.iter().map(|images| plane(&images[k])[at]).collect();
@@ -122,19 +123,21 @@ fn has_fallen(
             *values.select_nth_unstable(middle).1
         };
         for at in window(camera, k, domino, image)? {
-            let is_there = covers(median(|f| &f.cb, at), median(|f| &f.cr, at));
-            if covers(image.cb[at], image.cr[at]) {
-                seen += 1;
-                kept += usize::from(is_there);
-            } else {
-                beside += usize::from(is_there);
+            let before = covered(image.cb[at], image.cr[at]);
+            let now = covered(median(|f| &f.cb, at), median(|f| &f.cr, at));
+            if before > FAINT {
+                seen += before;
+                kept += before.min(now);
+            }
+            if now - before > FAINT {
+                beside += now - before;
             }
         }
     }
-    if seen < MIN_SAMPLES {
+    if seen < MIN_AREA {
         return None;
     }
-    let [kept, beside] = [kept, beside].map(|samples| samples as f64 / seen as f64);
+    let [kept, beside] = [kept, beside].map(|area| area / seen);
     let lies = if kept < LEFT { LIES_HIDDEN } else { LIES };
     match kept >= STANDS {
         true => Some(false),

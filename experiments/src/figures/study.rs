@@ -39,7 +39,7 @@ pub const STUDIES: [Study; 17] = [
     once("full-pipeline", &["full-pipeline"]),
     once("sysid", &["sysid"]),
     once("sysid-nn", &["sysid", "--method", "nn"]),
-    once("sysid-ood", &["sysid-ood"]),
+    once("sysid-ood", &["sysid-ood", "--ropes", "128"]),
     once("wiggle-ablation", &["wiggle-ablation"]),
     once("motion-fidelity", &["motion-fidelity"]),
     Study {

@@ -331,10 +331,8 @@ impl Bridge {
             }
             ControlEvent::Disarmed { fault } => {
                 tracing::info!(?fault, "disarmed");
-                self.armed = Err(match fault {
-                    FaultCode::ArmingExpired => fault,
-                    _ => FaultCode::NotArmed,
-                });
+                let expired = fault == FaultCode::ArmingExpired;
+                self.armed = Err(if expired { fault } else { FaultCode::NotArmed });
             }
         }
     }
