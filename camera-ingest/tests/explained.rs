@@ -34,8 +34,8 @@ fn tracked(folder: &Path, both: bool) -> TrackResult {
     track(images.film(), &camera, &*motion(folder), USUAL_KEYPOINTS).unwrap()
 }
 
-/// Within the bounds of `checks/track_scenes.py`, in the median further than they ask: median, 95th percentile, the tip's 95th
-/// percentile; hardly anything lost, nothing wrong with confidence.
+/// Median, 95th percentile, the tip's 95th percentile; hardly anything lost, nothing wrong with
+/// confidence.
 fn assert_followed(name: &str, result: &TrackResult, truth: &[Vec<[f64; 2]>]) {
     let frames = &result.track.frames;
     let (mut all, mut tip, mut wrong) = (Vec::new(), Vec::new(), 0);

@@ -134,9 +134,9 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 pub fn watch_interrupts() -> anyhow::Result<()> {
     ctrlc::set_handler(|| {
         let is_first = !INTERRUPTED.swap(true, Ordering::SeqCst);
-        // Whoever pressed it sees nothing else until what moves stands and what runs has ended.
+        // Stopping an arm and its processes takes seconds during which nothing else is printed.
         if is_first && std::io::stderr().is_terminal() {
-            eprintln!("\ninterrupted: ending in order, which takes some seconds");
+            eprintln!("\nending");
         }
     })
     .context("cannot watch for Ctrl-C")

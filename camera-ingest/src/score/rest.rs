@@ -25,18 +25,24 @@ const DOMINO_FRAMES: usize = 15;
 const DOMINO_EVERY: usize = 5;
 /// Around the domino's projection: what a calibration is off by, and more (px).
 const WINDOW_PX: f64 = 22.0;
-/// Coverage of a sample, or change of it, that is more than noise: one that lies flat is hardly
+/// Coverage from which a sample shows the domino where it stands: of one that is seen edge-on no
+/// sample shows more than a part, and a board of wood is faintly orange itself.
+const COVERED: f64 = 0.25;
+/// Least increase of a sample's coverage that is not noise: a domino that lies flat is hardly
 /// thicker than a pixel.
-const FAINT: f64 = 0.15;
-/// Samples in both images that it must cover to be visible.
-const MIN_AREA: f64 = 4.0;
+const INCREASE: f64 = 0.15;
+/// Area of a visible domino, both images together (samples).
+const MIN_AREA: f64 = 3.0;
 /// Part of its area that keeps its colour as long as it stands.
 const STANDS: f64 = 0.5;
-/// New area of its colour, as a part of what it had, that shows where it lies: of one that has
-/// partly left its place, and of one that has left it but for so much, which the lead may hide.
+/// Part of its area that has left the place of one that has fallen altogether.
+const LEFT: f64 = 0.85;
+/// New area beside its place, as a part of what it had, that shows that it lies there.
 const LIES: f64 = 0.25;
+/// The same where it has left its place altogether: the lead may lie on it and hide the rest.
 const LIES_HIDDEN: f64 = 0.08;
-const LEFT: f64 = 0.15;
+/// Least new area (samples).
+const MIN_NEW_AREA: f64 = 1.0;
 
 /// Looks for tip and domino in all frames; `from_ns` is the begin of the throw
 /// (CLOCK_MONOTONIC).
@@ -63,7 +69,7 @@ pub fn look(
     let first: Vec<usize> = (0..FIRST_FRAMES).collect();
     let scene = Scene::of_frames(source, camera, &first)?;
     let (mut detections, mut end_s) = (Vec::new(), 0.0);
-    let (mut shown, mut fell) = (VecDeque::new(), None);
+    let (mut shown, mut fell, mut before) = (VecDeque::new(), None, None);
     for index in 0..frames {
         let frame = read_sized(source, index, camera)?;
         let since_s = MonotonicNs(frame.0.stamp_ns).since_s(MonotonicNs(from_ns));
@@ -80,7 +86,10 @@ pub fn look(
         // The last look ends with the film.
         if shown.len() == DOMINO_FRAMES && (frames - 1 - index).is_multiple_of(DOMINO_EVERY) {
             let now = has_fallen(&scene, camera, domino, &shown);
-            fell = now.or(fell.filter(|fell| *fell));
+            // One look alone may be of something else that passes.
+            let sure = now.filter(|fell| !fell || before == now);
+            fell = sure.or(fell.filter(|fell| *fell));
+            before = now;
         }
     }
     if detections.len() < MIN_DETECTIONS {
@@ -125,11 +134,10 @@ fn has_fallen(
         for at in window(camera, k, domino, image)? {
             let before = covered(image.cb[at], image.cr[at]);
             let now = covered(median(|f| &f.cb, at), median(|f| &f.cr, at));
-            if before > FAINT {
+            if before > COVERED {
                 seen += before;
                 kept += before.min(now);
-            }
-            if now - before > FAINT {
+            } else if now - before > INCREASE {
                 beside += now - before;
             }
         }
@@ -137,11 +145,11 @@ fn has_fallen(
     if seen < MIN_AREA {
         return None;
     }
-    let [kept, beside] = [kept, beside].map(|area| area / seen);
-    let lies = if kept < LEFT { LIES_HIDDEN } else { LIES };
-    match kept >= STANDS {
+    let has_left = kept < (1.0 - LEFT) * seen;
+    let lies = seen * if has_left { LIES_HIDDEN } else { LIES };
+    match kept >= STANDS * seen {
         true => Some(false),
-        false => (beside >= lies).then_some(true),
+        false => (beside >= lies.max(MIN_NEW_AREA)).then_some(true),
     }
 }
 

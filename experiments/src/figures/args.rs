@@ -9,11 +9,12 @@ pub enum FiguresCommand {
     /// Run studies with seeds that follow from the commit, and keep their figures.
     ///
     /// Studies: strike, lob, drape, strike-loaded (throws of `wag demo`, the last with eight busy
-    /// threads beside it), two-terminals (`wag run` in front of a `wag rig`), sim-pipeline, lob-drape, full-pipeline, sysid, sysid-ood,
-    /// wiggle-ablation, motion-fidelity, robust, parameter-importance (the results of these names), sysid-nn,
-    /// lob-drape-nn, lob-drape-cmaes (the same by the paper's methods). All take hours; an interrupted
-    /// one goes on where it was. Nothing else should run on the machine, and sources that differ
-    /// from their commit are refused.
+    /// threads beside it), two-terminals (`wag run` in front of a `wag rig`), sim-pipeline,
+    /// lob-drape, full-pipeline, sysid, sysid-ood, wiggle-ablation, motion-fidelity, robust,
+    /// parameter-importance (the results of these names), sysid-nn, lob-drape-nn, lob-drape-cmaes
+    /// (the same with `--method nn` and `cmaes`, the paper's). Some take a minute, together they
+    /// take hours; an interrupted one goes on where it was. Nothing else should run on the machine,
+    /// and sources that differ from their commit are refused.
     Make(MakeFiguresArgs),
     /// Write the figures kept into documents.
     Write(FillFiguresArgs),

@@ -106,7 +106,11 @@ const CONDITIONS: [Condition; 4] = [
         |t| t.true_rope,
         Some([1.2, 0.25, 21.6, 1.4]),
     ),
-    ("true parameters, 3 s", |t| t.true_rope_longer, None),
+    (
+        "true parameters, up to three searches",
+        |t| t.true_rope_longer,
+        None,
+    ),
     (
         "identified parameters",
         |t| t.identified,

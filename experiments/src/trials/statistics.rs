@@ -56,15 +56,15 @@ pub fn wilson(hits: usize, n: usize) -> [f64; 3] {
 /// How often something was so, with 95 % limits after Wilson.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Rate {
-    /// How many there were.
+    /// Number of trials.
     pub n: usize,
-    /// Of how many it was so.
+    /// Trials in which it was so.
     #[serde(rename = "true")]
     pub hits: usize,
-    /// Of how many not.
+    /// Trials in which it was not.
     #[serde(rename = "false")]
     pub others: usize,
-    /// The part of which it was so.
+    /// Part of the trials in which it was so.
     pub rate: f64,
     /// Its lower limit.
     pub low: f64,
@@ -73,7 +73,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// Of these.
+    /// Of trials, each true or false.
     #[must_use]
     pub fn of(truths: impl IntoIterator<Item = bool>) -> Self {
         let (n, hits) = truths.into_iter().fold((0, 0), |(n, hits), truth| {

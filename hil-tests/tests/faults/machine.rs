@@ -117,13 +117,21 @@ fn fault_02_a_machine_that_is_always_too_slow_stops_the_motion() {
 }
 
 #[test]
-fn fault_02_three_cycles_lost_at_once_slow_the_motion() {
+fn fault_02_three_to_five_cycles_lost_at_once_slow_the_motion_and_six_end_it() {
     // By velocities the arm has begun to brake by itself after 12 ms.
     let via = CommandInterface::ServoPosition;
-    let mut stage = Stage::disturbed(via, 0.5, |rig| rig.oversleep([12 * MS + 300_000]));
-    let cause = stage.assert_stop(slowed(FaultCode::LateCycles));
-    assert_eq!((cause.limit.value, cause.limit.limit), (3.0, 2.0));
-    stage.assert_works_again();
+    for lost in 3..=6 {
+        let late_ns = 4 * lost * MS + 300_000;
+        let mut stage = Stage::disturbed(via, 0.5, |rig| rig.oversleep([late_ns]));
+        let (met, most) = if lost > 5 {
+            (stopped(FaultCode::DeadlineMissed), 5.0)
+        } else {
+            (slowed(FaultCode::LateCycles), 2.0)
+        };
+        let cause = stage.assert_stop(met);
+        assert_eq!((cause.limit.value, cause.limit.limit), (lost as f64, most));
+        stage.assert_works_again();
+    }
 }
 
 /// In the gap the arm has come to rest: a brake from where it was would begin

@@ -62,7 +62,7 @@ impl Bridge {
     }
 
     /// What is armed, with the enabling switch held; refuses the call where nothing is.
-    pub(super) fn armed(&self, call: &ControllerCall) -> Option<OperatingMode> {
+    pub(super) fn require_armed(&self, call: &ControllerCall) -> Option<OperatingMode> {
         if !self.settings.arming_required {
             return Some(OperatingMode::Throw);
         }

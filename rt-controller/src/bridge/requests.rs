@@ -207,7 +207,7 @@ impl Bridge {
         if !self.may_move(&call) {
             return;
         }
-        let Some(armed) = self.armed(&call) else {
+        let Some(armed) = self.require_armed(&call) else {
             return;
         };
         let from = self.newest.q_c;
@@ -235,7 +235,7 @@ impl Bridge {
             Ok(motions) => motions,
             Err((fault, detail)) => return refuse(&call, fault, &detail),
         };
-        let Some(armed) = self.armed(&call) else {
+        let Some(armed) = self.require_armed(&call) else {
             return;
         };
         let speed = self.armed_speed(armed);

@@ -73,8 +73,9 @@ impl Run<'_> {
             }
             Err(lost) => return Err(lost),
         };
-        if dropped > frames / 10 {
-            tracing::warn!("{dropped} frames dropped: the film tells less; is the machine busy?");
+        if 10 * dropped > frames + dropped {
+            let lost = format!("the camera dropped {dropped} frames: is the machine busy?");
+            self.warn(&lost);
         }
         Ok(Film {
             first_stamp_ns,
