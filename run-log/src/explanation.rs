@@ -139,7 +139,7 @@ pub fn explain(log: &RunLog) -> Explanation {
 
 /// A controller that ends tells its loop to stop; with the arm at rest nothing
 /// is stopped by that.
-fn is_orderly_end(cause: &CauseRecord) -> bool {
+pub(crate) fn is_orderly_end(cause: &CauseRecord) -> bool {
     cause.fault() == FaultCode::OperatorStop && cause.mode == ControllerMode::Idle as u8
 }
 

@@ -180,7 +180,7 @@ function showWork(work) {
 /** The run is over: its report, and what can be done next. */
 async function showResult(work) {
   byId("result").hidden = false;
-  byId("headline").textContent = work.is_ok ? `Done: ${work.run}` : `Not done: ${work.error || "no reason is known"}`;
+  byId("headline").textContent = work.is_ok ? work.headline || `Done: ${work.run}` : `Not done: ${work.error || "no reason is known"}`;
   byId("headline").classList.toggle("bad", !work.is_ok);
   await history();
   const past = pastRuns.find((run) => run.name === work.run);

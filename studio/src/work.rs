@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
+use viewer::report::headline_of;
 
 /// Lines for people that are kept.
 const LINES_MAX: usize = 60;
@@ -107,6 +108,8 @@ pub(crate) struct Work {
     pub(crate) run: PathBuf,
     /// Its exit code, once it has ended.
     code: Option<i32>,
+    /// What came of it, once it has ended well.
+    headline: Option<String>,
 }
 
 /// What a page is told of it.
@@ -116,6 +119,8 @@ pub(crate) struct View {
     run: String,
     is_over: bool,
     is_ok: bool,
+    /// What came of it: one that ends well may have missed.
+    headline: Option<String>,
     /// What went wrong.
     error: Option<String>,
     #[serde(flatten)]
@@ -146,6 +151,7 @@ impl Work {
             readers,
             run,
             code: None,
+            headline: None,
         })
     }
 
@@ -159,6 +165,7 @@ impl Work {
             }
             self.operator = None;
             self.code = Some(status.code().unwrap_or(-1));
+            self.headline = headline_of(&self.run).filter(|_| status.success());
             let mut told = locked(&self.told);
             (told.question, told.holds) = (None, false);
         }
@@ -181,6 +188,7 @@ impl Work {
             run: name_of(&self.run),
             is_over: self.is_over(),
             is_ok,
+            headline: self.headline.clone(),
             error: (!is_ok).then(|| said.or_else(ended)).flatten(),
             told,
         }

@@ -23,7 +23,8 @@ pub use error::CalibError;
 pub use factory::write_factory_conf;
 pub use mode::VideoMode;
 pub use settings::{
-    ModelFiles, check_camera, load_model_files, placed_camera_toml, write_camera_toml,
+    ModelFiles, check_camera, keep_calibration, load_exposure, load_model_files,
+    placed_camera_toml, write_camera_toml,
 };
 use shared_types::StereoCamera;
 
@@ -51,6 +52,7 @@ pub fn load_camera(path: &Path) -> Result<StereoCamera, CalibError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::live::{Exposure, LiveSettings};
     use nalgebra::{Matrix3, Rotation3, Vector3};
     use shared_types::{Intrinsics, Shutter};
 
@@ -166,5 +168,30 @@ mod tests {
             (camera.shutter, camera.exposure_s)
         );
         assert_eq!(back.line_time_s, camera.line_time_s);
+    }
+
+    #[test]
+    fn a_file_sets_the_exposure_of_the_device_that_films() {
+        let folder = tempfile::tempdir().unwrap();
+        let toml = folder.path().join("camera.toml");
+        let example = include_str!("../../../configs/camera/example.toml");
+        let with = |live: &str| {
+            std::fs::write(&toml, format!("{example}\n{live}")).unwrap();
+            load_exposure(&toml)
+        };
+        assert_eq!(with("").unwrap(), Exposure::default());
+        let fixed = with("[live]\nexposure_raw = 400\nsensor_gain_raw = 12\n").unwrap();
+        let device = LiveSettings::new("/dev/video7".into(), VideoMode::Vga, 60, fixed).unwrap();
+        assert_eq!(
+            (device.exposure_raw, device.sensor_gain_raw),
+            (Some(400), Some(12))
+        );
+        let refused = with("[live]\nexposure = 400\n").unwrap_err().to_string();
+        assert!(refused.contains("exposure"), "{refused}");
+        // A new place of the camera leaves it as it is.
+        with("[live]\nexposure_raw = 400\n").unwrap();
+        let place = (Matrix3::identity(), Vector3::zeros());
+        let moved = placed_camera_toml(&toml, &toml, &place.0, &place.1).unwrap();
+        assert!(moved.contains("exposure_raw = 400"), "{moved}");
     }
 }

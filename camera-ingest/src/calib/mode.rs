@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use shared_types::Intrinsics;
+use shared_types::{Intrinsics, StereoCamera};
 
 /// Video mode of the camera; it names the calibration's sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -33,11 +33,18 @@ impl VideoMode {
         }
     }
 
-    /// The mode whose images have this width and height (px).
-    #[must_use]
-    pub fn of_size_px(size_px: (u32, u32)) -> Option<Self> {
+    /// The mode whose images have the size of a calibration's.
+    ///
+    /// # Errors
+    /// None has; in words.
+    pub fn of_camera(camera: &StereoCamera) -> Result<Self, String> {
+        let size_px = (camera.width_px, camera.height_px);
         let all = [Self::TwoK, Self::FullHd, Self::Hd, Self::Vga];
-        all.into_iter().find(|mode| mode.size_px() == size_px)
+        let found = all.into_iter().find(|mode| mode.size_px() == size_px);
+        let (width_px, height_px) = size_px;
+        found.ok_or_else(|| {
+            format!("no camera of this system has images of {width_px}x{height_px} pixels")
+        })
     }
 
     /// Width and height of one image (px).

@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 use shared_types::{Shutter, StereoCamera};
 
 use super::error::{CalibError, read_text, write_text};
+use super::factory::write_factory_conf;
 use super::mode::{StereoGeometry, VideoMode};
+use crate::live::Exposure;
 
 /// The file's fields.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -27,6 +29,12 @@ pub(super) struct CameraSettings {
     extrinsics: Extrinsics,
     #[serde(default, skip_serializing_if = "ModelFiles::none")]
     models: ModelFiles,
+    #[serde(default, skip_serializing_if = "is_untouched")]
+    live: Exposure,
+}
+
+fn is_untouched(live: &Exposure) -> bool {
+    *live == Exposure::default()
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -86,6 +94,14 @@ pub(super) fn read(path: &Path) -> Result<CameraSettings, CalibError> {
 pub fn load_model_files(path: &Path) -> Result<ModelFiles, CalibError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     Ok(read(path)?.models.within(folder))
+}
+
+/// What a `camera.toml` sets a device to that is opened to film a run.
+///
+/// # Errors
+/// The file is missing or malformed.
+pub fn load_exposure(path: &Path) -> Result<Exposure, CalibError> {
+    Ok(read(path)?.live)
 }
 
 /// Farthest that a camera stands from the arm's base, in each direction (m).
@@ -171,6 +187,18 @@ impl CameraSettings {
     }
 }
 
+/// Writes the calibration of a camera into a folder, as a laboratory keeps it: `camera.toml`, here
+/// `toml`, and beside it the vendor's file, `camera.conf`.
+///
+/// # Errors
+/// Images of a size that no mode has, or a file cannot be written.
+pub fn keep_calibration(toml: &Path, camera: &StereoCamera) -> Result<(), CalibError> {
+    let mode = VideoMode::of_camera(camera).map_err(|why| CalibError::settings(toml, why))?;
+    let conf = Path::new("camera.conf");
+    write_factory_conf(&toml.with_file_name(conf), camera, mode)?;
+    write_camera_toml(toml, camera, mode, conf)
+}
+
 /// Writes `camera.toml` for a camera; `calibration` is taken relative to `path`.
 ///
 /// # Errors
@@ -190,6 +218,7 @@ pub fn write_camera_toml(
         line_time_s: camera.line_time_s,
         extrinsics: Extrinsics::new(&camera.r_w_cam, &camera.p_w_cam_m),
         models: ModelFiles::default(),
+        live: Exposure::default(),
     };
     write_text(path, &text(path, &settings)?)
 }

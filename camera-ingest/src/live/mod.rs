@@ -52,7 +52,45 @@ pub struct LiveSettings {
     pub sensor_gain_raw: Option<u32>,
 }
 
+/// `[live]` of a `camera.toml`: what a device that is opened to film a run is set to. Keys as in
+/// [`LiveSettings`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Exposure {
+    /// The camera's ordinary control for gain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<i32>,
+    /// Exposure in the sensor's own units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposure_raw: Option<u32>,
+    /// Gain in the sensor's own units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor_gain_raw: Option<u32>,
+}
+
 impl LiveSettings {
+    /// A device with the pictures and the exposure that it is to have.
+    ///
+    /// # Errors
+    /// What is out of range at that rate.
+    pub fn new(
+        device: PathBuf,
+        mode: VideoMode,
+        rate_hz: u32,
+        exposure: Exposure,
+    ) -> Result<Self, String> {
+        let settings = Self {
+            device,
+            mode,
+            rate_hz,
+            gain: exposure.gain,
+            exposure_raw: exposure.exposure_raw,
+            sensor_gain_raw: exposure.sensor_gain_raw,
+        };
+        settings.sensor()?;
+        Ok(settings)
+    }
+
     /// Width of both images together and height (px).
     #[must_use]
     pub fn size_px(&self) -> [u32; 2] {

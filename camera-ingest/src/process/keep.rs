@@ -24,6 +24,7 @@ pub(super) struct Recording {
     first_sequence: u64,
     last_sequence: u64,
     first_stamp_ns: u64,
+    last_stamp_ns: u64,
 }
 
 impl Default for Recording {
@@ -44,6 +45,7 @@ impl Recording {
             first_sequence: 0,
             last_sequence: 0,
             first_stamp_ns: 0,
+            last_stamp_ns: 0,
         }
     }
 
@@ -68,6 +70,12 @@ impl Recording {
         u32::try_from(span.saturating_sub(self.count() as u64)).unwrap_or(u32::MAX)
     }
 
+    fn rate_hz(&self) -> f64 {
+        let taken = self.last_sequence.saturating_sub(self.first_sequence);
+        let over_ns = self.last_stamp_ns.saturating_sub(self.first_stamp_ns);
+        1e9 * taken as f64 / over_ns.max(1) as f64
+    }
+
     pub(super) fn first_stamp_ns(&self) -> u64 {
         self.first_stamp_ns
     }
@@ -79,6 +87,7 @@ impl Recording {
             self.first_stamp_ns = frame.0.stamp_ns;
         }
         self.last_sequence = frame.0.sequence;
+        self.last_stamp_ns = frame.0.stamp_ns;
         match &mut self.frames {
             Frames::Film(film) => {
                 if Film::needs_right(film.left.len(), self.wanted as usize) {
@@ -97,6 +106,7 @@ impl Recording {
             first_stamp_ns: self.first_stamp_ns,
             frames,
             dropped: self.dropped(),
+            rate_hz: self.rate_hz(),
         })
     }
 
@@ -159,7 +169,9 @@ mod tests {
             Some(CameraEvent::Recorded {
                 first_stamp_ns: 1010,
                 frames: 3,
-                dropped: 2
+                dropped: 2,
+                // The frames of this test are a nanosecond apart.
+                rate_hz: 1e9,
             })
         );
         assert_eq!(

@@ -47,7 +47,7 @@ pub struct MakeFiguresArgs {
 #[derive(Debug, Args)]
 pub struct FillFiguresArgs {
     /// Documents with blocks of figures.
-    #[arg(value_name = "FILE", default_values = ["README.md", "docs/src/figures.md", "docs/src/numbers.md", "docs/src/planning.md"])]
+    #[arg(value_name = "FILE", default_values = ["README.md", "docs/src/figures.md", "docs/src/numbers.md", "docs/src/planning.md", "docs/src/contacts.md", "docs/src/simulator.md"])]
     pub documents: Vec<PathBuf>,
     /// Folder of the figures.
     #[arg(long, value_name = "DIR", default_value = "docs/figures")]

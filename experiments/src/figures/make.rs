@@ -146,6 +146,7 @@ fn command_line(study: &Study) -> String {
         Program::WagBesideRig => format!(
             "wag {args} --seed SEED --arm 127.0.0.1 --camera DOMAIN, in front of wag rig --rope random --camera DOMAIN --seed SEED"
         ),
+        Program::Experiments if !study.has_seed => format!("experiments {args}"),
         Program::Experiments => format!("experiments {args} --seed SEED"),
     }
 }
@@ -249,9 +250,10 @@ impl Making<'_> {
     fn run(&self, seed: u64, run: &Path) -> anyhow::Result<Output> {
         let _ = std::fs::remove_dir_all(run);
         let mut command = Command::new(&self.program);
-        command
-            .args(self.study.args)
-            .args(["--json", "--seed", &seed.to_string()]);
+        command.args(self.study.args).arg("--json");
+        if self.study.has_seed {
+            command.args(["--seed", &seed.to_string()]);
+        }
         let rig = match self.study.program {
             Program::WagBesideRig => Some(Rig::start(&self.program, seed)?),
             Program::Wag | Program::Experiments => None,

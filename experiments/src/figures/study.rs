@@ -15,6 +15,8 @@ pub struct Study {
     pub runs: u64,
     /// Busy threads beside it.
     pub load: u16,
+    /// Whether it has a seed: else it is the same every time.
+    pub has_seed: bool,
 }
 
 /// Programs of this project.
@@ -29,7 +31,7 @@ pub enum Program {
 }
 
 /// All studies. A new one goes to the end: the place of a study gives its seeds.
-pub const STUDIES: [Study; 17] = [
+pub const STUDIES: [Study; 20] = [
     throws("strike", &["demo", "--task", "strike"], 100, 0),
     throws("lob", &["demo", "--task", "lob"], 30, 0),
     throws("drape", &["demo", "--task", "drape"], 30, 0),
@@ -50,6 +52,18 @@ pub const STUDIES: [Study; 17] = [
     once("lob-drape-cmaes", &["lob-drape", "--method", "cmaes"]),
     once("robust", &["robust"]),
     once("parameter-importance", &["parameter-importance"]),
+    once("rope-accuracy", &["rope-accuracy"]),
+    Study {
+        has_seed: false,
+        ..once("contact-dynamics", &["contact-dynamics"])
+    },
+    Study {
+        has_seed: false,
+        ..once(
+            "contact-dynamics-fine",
+            &["contact-dynamics", "--step-ms", "0.1"],
+        )
+    },
 ];
 
 const fn throws(name: &'static str, args: &'static [&'static str], runs: u64, load: u16) -> Study {
@@ -60,6 +74,7 @@ const fn throws(name: &'static str, args: &'static [&'static str], runs: u64, lo
         args,
         runs,
         load,
+        has_seed: true,
     }
 }
 
@@ -71,6 +86,7 @@ const fn once(name: &'static str, args: &'static [&'static str]) -> Study {
         args,
         runs: 1,
         load: 0,
+        has_seed: true,
     }
 }
 

@@ -195,7 +195,7 @@ pub(super) fn run(args: &RopeAccuracyArgs) -> Outcome<Option<Value>> {
     let table = spreads(&rows);
     let value = json!({
         "ok": true, "command": NAME, "version": VERSION, "program": program().or_failed()?,
-        "seed": args.seed, "mujoco": versions.first(), "mujoco_steps_s": THEIR_STEPS_S,
+        "seed": args.seed, "ropes": args.ropes, "mujoco": versions.first(), "mujoco_steps_s": THEIR_STEPS_S,
         "steps_s": STEPS_S, "summary": table, "rows": rows, "out": args.out,
     });
     stage.done(&format!("{} ropes", args.ropes));

@@ -11,6 +11,7 @@ use super::results::{Results, SimulateRope};
 use super::scene::{arm_frames, calibration, camera_place, room};
 use super::urdf::urdf;
 use super::writer::McapFile;
+use crate::explanation::is_orderly_end;
 use crate::files;
 use anyhow::{Context, Result, ensure};
 use arm_model::{Cell, Limits, Pole};
@@ -112,6 +113,8 @@ impl Ports {
     }
 }
 
+/// The last a controller tells whose arm was at rest.
+const ENDED: &str = "the controller was ended in order";
 const CANNOT_RECEIVE: &str = "cannot receive from shared memory";
 
 /// Hands what has arrived to `take`, a whole buffer at most: on a machine that is too
@@ -231,7 +234,11 @@ impl Recording {
         for read in LogReader::open(bytes).into_iter().flatten() {
             if let Read::Item(Item::Cause(cause)) = read {
                 let at_ns = self.clock.wall_ns(cause.stamp_ns);
-                self.log(at_ns, Level::Error, &messages::cause(&cause))?;
+                if is_orderly_end(&cause) {
+                    self.log(at_ns, Level::Info, ENDED)?;
+                } else {
+                    self.log(at_ns, Level::Error, &messages::cause(&cause))?;
+                }
             }
         }
         Ok(())
@@ -245,6 +252,12 @@ impl Recording {
         if cycle.sent != 0 {
             let message = messages::commanded(at_ns, cycle);
             self.file.json(Channel::Commanded, at_ns, &message)?;
+        }
+        // Told as what it is when its record comes.
+        let ended = self.mode == Some(ControllerMode::Idle as u8)
+            && cycle.fault == FaultCode::OperatorStop as u16;
+        if ended {
+            (self.mode, self.fault) = (Some(cycle.mode), cycle.fault);
         }
         if self.mode != Some(cycle.mode) {
             let now = ControllerMode::from_raw(cycle.mode);

@@ -111,6 +111,8 @@ pub enum CameraEvent {
         frames: u32,
         /// Frames the camera dropped in between.
         dropped: u32,
+        /// Frames a second that it took, dropped ones among them; of a single frame 0.
+        rate_hz: f64,
     },
     /// Keypoints of all frames are published.
     Tracked {

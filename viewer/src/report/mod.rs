@@ -22,8 +22,7 @@ pub use latency::histogram;
 pub use limits::LimitRow;
 pub use page::{PLOTS, STYLE, VIEW};
 pub use planned::PlannedMotion;
-pub(crate) use read::headline_of;
-pub use read::{rope_rows, simulated_rope};
+pub use read::{headline_of, rope_rows, simulated_rope};
 pub use replay::{arm_points, tenths_mm};
 
 use anyhow::ensure;

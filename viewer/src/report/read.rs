@@ -81,7 +81,7 @@ pub fn simulated_rope(run: &Path) -> anyhow::Result<Vec<RopeMotion>> {
 }
 
 /// What came of a run in one line; nothing before it has ended.
-pub(crate) fn headline_of(run: &Path) -> Option<String> {
+pub fn headline_of(run: &Path) -> Option<String> {
     let run = Run::open(run).ok()?;
     let summary = run.summary().ok()??;
     let plan = run.plan().ok()?;

@@ -3,31 +3,27 @@
 
 use super::{RunFolder, start};
 use crate::config;
-use anyhow::{Context, anyhow, bail};
-use camera_ingest::calib::{VideoMode, load_camera, write_camera_toml, write_factory_conf};
-use camera_ingest::live::{CameraConfig, LiveSettings};
+use anyhow::{anyhow, bail};
+use camera_ingest::calib::{load_camera, load_exposure};
+use camera_ingest::live::{CameraConfig, Exposure, LiveSettings};
 use camera_ingest::process::CameraConfig as IngestConfig;
-use run_log::files;
 use session::{ProcessSpec, Session};
 use shared_types::StereoCamera;
 use shared_types::ipc::message::{CameraRequest, CameraRpc, RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::ipc::{Bus, DomainSweep, IpcError};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 /// Longest wait for a simulated rig.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(5);
-/// Frames per second, for which the lengths of the films are made.
-const RATE_HZ: u32 = 60;
-
 /// Where frames come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FramesFrom {
     /// Somebody publishes them in this shared-memory domain.
     Domain(String),
     /// A device of this machine.
-    Device(PathBuf),
+    Device(LiveSettings),
 }
 
 /// The camera, and the colours of tip and target where a simulated rig tells them.
@@ -38,10 +34,12 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The camera that a file describes: the one that is named, else that of this place.
-    pub fn of_file(named: Option<&Path>) -> anyhow::Result<Option<StereoCamera>> {
+    /// The camera that a file describes: the one that is named, else that of this place; and what
+    /// a device is set to that films for it.
+    pub fn of_file(named: Option<&Path>) -> anyhow::Result<Option<(StereoCamera, Exposure)>> {
         let here = named.map_or_else(config::camera_file, |path| Ok(Some(path.to_owned())))?;
-        Ok(here.map(|path| load_camera(&path)).transpose()?)
+        let found = here.map(|path| Ok((load_camera(&path)?, load_exposure(&path)?)));
+        found.transpose()
     }
 
     /// What a simulated rig tells.
@@ -60,41 +58,17 @@ impl Scene {
     }
 }
 
-/// The mode whose images have the calibration's size.
-fn mode(camera: &StereoCamera) -> anyhow::Result<VideoMode> {
-    let (width_px, height_px) = (camera.width_px, camera.height_px);
-    VideoMode::of_size_px((width_px, height_px)).with_context(|| {
-        format!("no camera of this system has images of {width_px}x{height_px} pixels")
-    })
-}
-
-/// Writes the calibration into a run's folder, as a laboratory keeps it.
-pub fn keep_calibration(folder: &RunFolder, camera: &StereoCamera) -> anyhow::Result<()> {
-    let (conf, mode) = (Path::new("camera.conf"), mode(camera)?);
-    write_factory_conf(&folder.path.join(conf), camera, mode)?;
-    write_camera_toml(&folder.file(files::CAMERA), camera, mode, conf)?;
-    Ok(())
-}
-
 /// Starts the device, if one films, and what takes the frames in, unless that runs already.
 pub fn start_camera(
     session: &mut Session,
     folder: &RunFolder,
     from: &FramesFrom,
-    calibration: &StereoCamera,
 ) -> anyhow::Result<RpcClient<CameraRpc>> {
     let domain = folder.domain.clone();
     if let FramesFrom::Device(device) = from {
         let config = CameraConfig {
             domain: domain.clone(),
-            camera: LiveSettings {
-                device: device.clone(),
-                mode: mode(calibration)?,
-                rate_hz: RATE_HZ,
-                gain: None,
-                exposure_raw: None,
-                sensor_gain_raw: None,
-            },
+            camera: device.clone(),
         };
         session.start(&ProcessSpec {
             name: "camera",

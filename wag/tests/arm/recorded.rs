@@ -28,6 +28,16 @@ fn topics(bytes: &[u8]) -> BTreeMap<String, u64> {
     counts
 }
 
+/// What a run's file tells as an error (Foxglove's level 4) or worse.
+fn errors_told(bytes: &[u8]) -> Vec<String> {
+    let messages = MessageStream::new(bytes).unwrap().map(Result::unwrap);
+    let log = messages.filter(|message| message.channel.topic == "/log");
+    let told = log.map(|message| serde_json::from_slice::<Value>(&message.data).unwrap());
+    told.filter(|told| told["level"].as_u64().unwrap() >= 4)
+        .map(|told| told["message"].to_string())
+        .collect()
+}
+
 /// The published Python reader agrees, where there is one.
 fn python_agrees(file: &Path) {
     const TOPICS: &str = "/arm/measured /arm/commanded /controller/cycles /tf /scene /log \
@@ -133,6 +143,7 @@ fn its_file_is_whole(run: &Path) {
     assert!(counts["/arm/measured"] > 1000, "{counts:?}");
     assert!(counts["/tf"] > 200, "{counts:?}");
     assert_eq!(counts["/wag/summary"], 1);
+    assert_eq!(errors_told(&bytes), Vec::<String>::new());
     python_agrees(&file);
     let replayed = replays_exactly(&name.to_string());
     assert_eq!(replayed["first_cycle"], 1, "{replayed}");

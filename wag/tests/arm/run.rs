@@ -2,6 +2,8 @@
 
 use super::support::{Rig, alone, json_in, refused_in};
 use run_log::files;
+use serde_json::{Value, json};
+use std::fs;
 
 #[test]
 fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_there() {
@@ -52,6 +54,47 @@ fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_the
     let tracked = json_in(here, "identify --keypoints alone --out third.toml");
     let third = length_m(&tracked["rope"]);
     assert!((first - third).abs() < 2e-2, "{first} and {third} m");
+
+    // Its throw, and what the first run has found is gone on with from every stage.
+    let thrown = |from: &str, out: &str| {
+        let line = format!("run {from} {arm} --camera {domain} --out {out}");
+        let done = json_in(here, &line);
+        let missed_m = done["true_tip_target_distance_m"].as_f64().unwrap();
+        assert!(missed_m < 0.02, "{line}: {missed_m} m");
+        done
+    };
+    thrown("--from identify alone --target 0.85,0.1,0.3", "a");
+    let moved = thrown("--from plan run --target 0.8,-0.15,0.35", "b");
+    assert_eq!(moved["target_m"], json!([0.8, -0.15, 0.35]));
+    assert_eq!(moved["identified"], Value::Null, "the rope was known");
+    let plan = |run: &str| fs::read(here.join(run).join(files::PLAN)).unwrap();
+    thrown("--from throw run", "c");
+    assert_eq!(plan("c"), plan("run"));
+    let corrected = thrown("--again run", "d");
+    assert_eq!(corrected["target_m"], done["target_m"]);
+    assert_ne!(plan("d"), plan("run"));
+}
+
+/// The rig puts board and domino up; what the tip does to them is judged by camera and truth alike.
+#[test]
+fn a_lob_is_thrown_with_an_arm_and_a_camera_that_are_there_and_judged_as_it_is() {
+    let _turn = alone();
+    let domain = format!("lob{}", std::process::id());
+    let rig = Rig::start(&format!(
+        "--rope random --seed 41 --camera {domain} --task lob"
+    ));
+    let [port, joints, _, rich, _] = rig.ports();
+    let folder = tempfile::tempdir().unwrap();
+    let done = json_in(
+        folder.path(),
+        &format!(
+            "run lob --arm 127.0.0.1 --command-port {port} --report-port {joints} --status-port {rich} --camera {domain} --out run"
+        ),
+    );
+    let [seen, true_] = [&done["camera_verdict"], &done["true_verdict"]];
+    assert_eq!(true_["success"], true, "{true_}");
+    assert_eq!(seen["success"], true, "{seen} {}", done["score_failed"]);
+    assert_eq!(seen["conditions"], true_["conditions"]);
 }
 
 /// The wall is put up, the rope thrown over it, filmed, and judged by camera and truth alike.

@@ -31,6 +31,7 @@ pub(crate) const MACHINES: &str = "
     run --arm 127.0.0.1 => --camera | /dev/videoN
     run --arm 127.0.0.1 --camera /dev/video99 --target 0.9,0,0.3 => no camera | /dev/video99
     run --arm 127.0.0.1 --camera nobody => nobody | --calibration
+    run --arm 127.0.0.1 --camera /dev/null --calibration bright.toml => [live] | 5000 | 2 to 880
     run --arm 127.0.0.1 --camera d --calibration no.toml => no.toml
     run --arm 127.0.0.1 --camera d --target 9,0,0 => out of reach
     run --from plann . --arm 127.0.0.1 --camera d => plann | identify, plan or throw

@@ -72,5 +72,12 @@ pub(crate) fn prepare() -> tempfile::TempDir {
     put("slip.toml", "tcp_sped_max_m_s = 0.5\n");
     let stuck = "[[fault]]\nat_s = 1\nkind = \"joint_stuck\"\njoint = 9\n";
     put("faults.toml", stuck);
+    let camera = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/camera/");
+    let bright = fs::read_to_string(format!("{camera}example.toml")).unwrap();
+    let bright = bright.replace("example.conf", &format!("{camera}example.conf"));
+    put(
+        "bright.toml",
+        &format!("{bright}\n[live]\nexposure_raw = 5000\n"),
+    );
     dir
 }

@@ -18,8 +18,8 @@ use std::time::Duration;
 
 /// Frames of a wiggle (paper: 400 at 60 Hz).
 const WIGGLE_FRAMES: u32 = 400;
-/// Frames per second.
-const RATE_HZ: f64 = 60.0;
+/// Frames per second, for which the lengths of the films are made.
+pub const RATE_HZ: u32 = 60;
 /// Frames of a strike: two and a half seconds.
 const STRIKE_FRAMES: u32 = 150;
 /// Time after the last setpoint that still belongs to a strike (s).
@@ -28,6 +28,17 @@ const AFTER_STRIKE_S: f64 = 0.6;
 const PLACED_WITHIN: Duration = Duration::from_secs(900);
 /// From the first frame of a film to the motion's begin, at most (s).
 const BEFORE_THROW_S: f64 = 0.4;
+
+/// Refuses a film at another rate than the one that its length is for.
+fn at_rate(event: CameraEvent) -> anyhow::Result<CameraEvent> {
+    if let CameraEvent::Recorded { rate_hz, .. } = event {
+        ensure!(
+            (rate_hz / f64::from(RATE_HZ) - 1.0).abs() < 0.1,
+            "the camera takes {rate_hz:.0} frames a second, {RATE_HZ} are needed: set it to that"
+        );
+    }
+    Ok(event)
+}
 
 impl Run<'_> {
     /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
@@ -61,7 +72,7 @@ impl Run<'_> {
                 stage.progress(p);
             }
         })?;
-        let [frames, dropped] = match answered(event) {
+        let [frames, dropped] = match answered(event).and_then(at_rate) {
             Ok(CameraEvent::Recorded {
                 frames, dropped, ..
             }) => [frames, dropped],
@@ -182,7 +193,7 @@ impl Run<'_> {
             None => STRIKE_FRAMES,
             Some(rests_s) => {
                 let lasts_s = BEFORE_THROW_S + plan.trajectory.duration_s() + rests_s;
-                (RATE_HZ * lasts_s).ceil() as u32
+                (f64::from(RATE_HZ) * lasts_s).ceil() as u32
             }
         };
         let film = self.film(frames, &plan.trajectory, true, &stage)?;

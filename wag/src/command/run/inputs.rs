@@ -6,8 +6,11 @@ use crate::command::known_rope::KnownRope;
 use crate::command::plan::LOOK;
 use crate::command::plan_again::check_thrown;
 use crate::command::run::Entry;
+use crate::command::run::filmed::RATE_HZ;
 use crate::command::unconfirmed::confirm;
 use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene, port_of_rig};
+use camera_ingest::calib::VideoMode;
+use camera_ingest::live::LiveSettings;
 use cli_output::{Failure, OrInput, Outcome};
 use planner::PlannerConfig;
 use planner::plan::{check_reach, clear_of_arm};
@@ -129,13 +132,11 @@ fn earlier(args: &RunArgs) -> Outcome<(Option<Task>, Option<[f64; 3]>, Colours)>
     ))
 }
 
-fn uncalibrated(from: &FramesFrom) -> Failure {
-    let nobody = match from {
-        FramesFrom::Domain(domain) => {
-            format!("no simulated rig films in domain `{domain}`, and where another camera ")
-        }
-        FramesFrom::Device(_) => "where the camera ".to_owned(),
-    };
+fn uncalibrated(domain: Option<&str>) -> Failure {
+    let nobody = domain.map_or_else(
+        || "where the camera ".to_owned(),
+        |name| format!("no simulated rig films in domain `{name}`, and where another camera "),
+    );
     bad_input!(
         "{nobody}stands is not known: name its camera.toml with --calibration, or put it into the folder of configurations (~/.config/wag); `wag calib extrinsics` estimates it"
     )
@@ -157,17 +158,21 @@ impl Inputs {
                     "there is no camera `{named}`; `ls /dev/video*` lists them"
                 ));
             }
-            (FramesFrom::Device(named.into()), None)
+            let (camera, exposure) = calibration.clone().ok_or_else(|| uncalibrated(None))?;
+            let mode = VideoMode::of_camera(&camera).map_err(|why| bad_input!("{why}"))?;
+            let device = LiveSettings::new(named.into(), mode, RATE_HZ, exposure);
+            let device = device.map_err(|why| bad_input!("`[live]` of its camera.toml: {why}"))?;
+            (FramesFrom::Device(device), None)
         } else {
             let rig_port = port_of_rig(named).or_input()?;
             (FramesFrom::Domain(named.clone()), rig_port)
         };
         if calibration.is_none() && rig_port.is_none() {
-            return Err(uncalibrated(&frames));
+            return Err(uncalibrated(Some(named)));
         }
         Ok(Self {
             frames,
-            calibration,
+            calibration: calibration.map(|(camera, _)| camera),
             names_calibration: args.calibration.is_some(),
             rig_port,
             task: Task::Strike,

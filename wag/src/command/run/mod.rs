@@ -20,7 +20,7 @@ use crate::config;
 use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene};
 use anyhow::Context;
 use arm_model::{JointTrajectory, Limits};
-use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
+use cli_output::{OrInput, Outcome, Stage, is_interrupted, watch_interrupts};
 use inputs::{Inputs, entry};
 use planner::PlannerConfig;
 use planner::wiggle::wiggle;
@@ -52,6 +52,9 @@ pub fn in_folder(
     let summary_kept = files::write_json(&folder.file(files::SUMMARY), &record);
     let recorded = session.finish_run_file();
     explain_stop(&folder.path);
+    if result.is_err() && !is_interrupted() {
+        keep_report(&folder.path);
+    }
     let result = result.with_context(|| format!("run `{}`", folder.path.display()));
     result.or_failed()?;
     keypoints_kept.or_failed()?;

@@ -37,7 +37,8 @@ const CONFIRMED_S: f64 = THROW_WITHIN_NS as f64 * 1e-9 - 0.5;
 /// How long the rope is watched for its stillness where somebody waits (s).
 const WATCHED_S: f64 = 15.0;
 /// What an operator confirms before it.
-const SETTLES: &str = "The arm will move to the throw's start and damp the rope's swing.";
+const SETTLES: &str =
+    "The arm will move to the throw's start and damp the rope's swing, as fast as in a wiggle.";
 /// Time after which the answer about a settling move is not waited for any longer (s).
 const SETTLED_S: f64 = 60.0;
 /// From the call to the first setpoint, on average (s): half a turn of the

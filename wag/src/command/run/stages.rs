@@ -4,18 +4,17 @@ use crate::command::area::response_for_plans;
 use crate::command::known_rope::KnownRope;
 use crate::command::motion;
 use crate::command::on_arm::{AT_START, enable, set_up_move};
-use crate::pipeline::{
-    self, ArmAddress, ArmLink, BringUp, FramesFrom, RunFolder, keep_calibration,
-};
+use crate::pipeline::{self, ArmAddress, ArmLink, BringUp, FramesFrom, RunFolder};
 use anyhow::{anyhow, bail};
 use arm_model::{JointTrajectory, Limits};
+use camera_ingest::calib::keep_calibration;
 use cli_output::{Stage, output};
 use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::service::{PlannerRequest, PlannerRpc};
 use planner::wiggle::wiggle;
 use rt_controller::os::now_ns;
-use run_log::{Film, RunRecord};
+use run_log::{Film, RunRecord, files};
 use session::Session;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRpc, RopeAppearance};
 use shared_types::ipc::rpc::RpcClient;
@@ -87,10 +86,10 @@ impl<'a> Run<'a> {
         stage: &Stage,
     ) -> anyhow::Result<Self> {
         let Setup { limits, .. } = &setup;
-        keep_calibration(folder, &setup.camera)?;
+        keep_calibration(&folder.file(files::CAMERA), &setup.camera)?;
         let camera = Some(&setup.camera);
         pipeline::start_recorder(session, folder, limits, camera, record.target_m)?;
-        let camera = pipeline::start_camera(session, folder, &setup.frames, &setup.camera)?;
+        let camera = pipeline::start_camera(session, folder, &setup.frames)?;
         let ping = PlannerRequest::Ping;
         let planner = match session.find(&ping)? {
             Some(running) => running,
