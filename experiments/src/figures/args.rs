@@ -12,7 +12,8 @@ pub enum FiguresCommand {
     /// threads beside it), two-terminals (`wag run` in front of a `wag rig`), sim-pipeline,
     /// lob-drape, full-pipeline, sysid, sysid-ood, wiggle-ablation, motion-fidelity, robust,
     /// parameter-importance (the results of these names), sysid-nn, lob-drape-nn, lob-drape-cmaes
-    /// (the same with `--method nn` and `cmaes`, the paper's). Some take a minute, together they
+    /// (the same with `--method nn` and `cmaes`, the paper's), rope-accuracy, contact-dynamics,
+    /// contact-dynamics-fine (steps of 0.1 ms; these two have no seed). Some take a minute, together they
     /// take hours; an interrupted one goes on where it was. Nothing else should run on the machine,
     /// and sources that differ from their commit are refused.
     Make(MakeFiguresArgs),

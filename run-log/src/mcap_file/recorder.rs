@@ -113,8 +113,8 @@ impl Ports {
     }
 }
 
-/// The last a controller tells whose arm was at rest.
-const ENDED: &str = "the controller was ended in order";
+/// What the end of a session looks like to the loop, and a stop by its operator then.
+const ENDED: &str = "commanded to stop while the arm was at rest";
 const CANNOT_RECEIVE: &str = "cannot receive from shared memory";
 
 /// Hands what has arrived to `take`, a whole buffer at most: on a machine that is too

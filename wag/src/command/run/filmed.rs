@@ -20,6 +20,8 @@ use std::time::Duration;
 const WIGGLE_FRAMES: u32 = 400;
 /// Frames per second, for which the lengths of the films are made.
 pub const RATE_HZ: u32 = 60;
+/// Part by which a camera's rate may differ: a film of a wiggle must not outlast its joints.
+const RATE_TOLERANCE: f64 = 0.04;
 /// Frames of a strike: two and a half seconds.
 const STRIKE_FRAMES: u32 = 150;
 /// Time after the last setpoint that still belongs to a strike (s).
@@ -29,15 +31,17 @@ const PLACED_WITHIN: Duration = Duration::from_secs(900);
 /// From the first frame of a film to the motion's begin, at most (s).
 const BEFORE_THROW_S: f64 = 0.4;
 
-/// Refuses a film at another rate than the one that its length is for.
-fn at_rate(event: CameraEvent) -> anyhow::Result<CameraEvent> {
-    if let CameraEvent::Recorded { rate_hz, .. } = event {
-        ensure!(
-            (rate_hz / f64::from(RATE_HZ) - 1.0).abs() < 0.1,
-            "the camera takes {rate_hz:.0} frames a second, {RATE_HZ} are needed: set it to that"
-        );
-    }
-    Ok(event)
+/// What is said of a film at another rate than the one that its length is for.
+fn at_another_rate(event: &CameraEvent) -> Option<String> {
+    let CameraEvent::Recorded { rate_hz, .. } = event else {
+        return None;
+    };
+    let off = (rate_hz / f64::from(RATE_HZ) - 1.0).abs();
+    (off > RATE_TOLERANCE).then(|| {
+        format!(
+            "the camera took {rate_hz:.0} frames a second, not {RATE_HZ}: start it at that rate; in dim light give it a fixed exposure (`[live]` of camera.toml)"
+        )
+    })
 }
 
 impl Run<'_> {
@@ -72,12 +76,17 @@ impl Run<'_> {
                 stage.progress(p);
             }
         })?;
-        let [frames, dropped] = match answered(event).and_then(at_rate) {
+        if let Some(why) = at_another_rate(&event) {
+            // What was thrown was thrown, and is measured.
+            ensure!(throw, "{why}");
+            self.warn(&why);
+        }
+        let [frames, dropped] = match answered(event) {
             Ok(CameraEvent::Recorded {
                 frames, dropped, ..
             }) => [frames, dropped],
             Ok(other) => bail!("the camera process answered a recording with {other:?}"),
-            // What was thrown was thrown.
+            // As above.
             Err(lost) if throw => {
                 self.record.set_score(Err(lost));
                 [0, 0]
