@@ -31,17 +31,13 @@ const PLACED_WITHIN: Duration = Duration::from_secs(900);
 /// From the first frame of a film to the motion's begin, at most (s).
 const BEFORE_THROW_S: f64 = 0.4;
 
-/// What is said of a film at another rate than the one that its length is for.
+/// What is said of a film at another rate than its length is for. That of a throw is kept.
 fn at_another_rate(event: &CameraEvent) -> Option<String> {
-    let CameraEvent::Recorded { rate_hz, .. } = event else {
+    let CameraEvent::Recorded { rate_hz: hz, .. } = event else {
         return None;
     };
-    let off = (rate_hz / f64::from(RATE_HZ) - 1.0).abs();
-    (off > RATE_TOLERANCE).then(|| {
-        format!(
-            "the camera took {rate_hz:.0} frames a second, not {RATE_HZ}: start it at that rate; in dim light give it a fixed exposure (`[live]` of camera.toml)"
-        )
-    })
+    let is_off = (hz / f64::from(RATE_HZ) - 1.0).abs() > RATE_TOLERANCE;
+    is_off.then(|| format!("the camera took {hz:.0} frames a second, not {RATE_HZ}: start it at that rate; in dim light give it a fixed exposure (`[live]` of camera.toml)"))
 }
 
 impl Run<'_> {
@@ -77,7 +73,6 @@ impl Run<'_> {
             }
         })?;
         if let Some(why) = at_another_rate(&event) {
-            // What was thrown was thrown, and is measured.
             ensure!(throw, "{why}");
             self.warn(&why);
         }
@@ -86,7 +81,6 @@ impl Run<'_> {
                 frames, dropped, ..
             }) => [frames, dropped],
             Ok(other) => bail!("the camera process answered a recording with {other:?}"),
-            // As above.
             Err(lost) if throw => {
                 self.record.set_score(Err(lost));
                 [0, 0]
@@ -94,8 +88,9 @@ impl Run<'_> {
             Err(lost) => return Err(lost),
         };
         if 10 * dropped > frames + dropped {
-            let lost = format!("the camera dropped {dropped} frames: is the machine busy?");
-            self.warn(&lost);
+            self.warn(&format!(
+                "the camera dropped {dropped} frames: is the machine busy?"
+            ));
         }
         Ok(Film {
             first_stamp_ns,
