@@ -2,7 +2,7 @@
 //! the truth beside them.
 
 use anyhow::Context;
-use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
+use camera_ingest::calib::keep_calibration;
 use camera_ingest::film::{film, jpeg_of_yuyv};
 use rig_sim::room::Kind;
 use rig_sim::room_film::{FRAME_RATE_HZ, RoomFilm};
@@ -68,13 +68,7 @@ pub(super) fn write(folder: &Path, seed: u64, kind: Kind) -> anyhow::Result<Scen
     let mut rendered = RoomFilm::draw(seed, kind)?;
     let scene = Scene::of(&rendered, seed);
     let camera = rendered.setting.calibrated.clone();
-    write_factory_conf(&folder.join("camera.conf"), &camera, VideoMode::Vga)?;
-    write_camera_toml(
-        &folder.join(files::CAMERA),
-        &camera,
-        VideoMode::Vga,
-        Path::new("camera.conf"),
-    )?;
+    keep_calibration(&folder.join(files::CAMERA), &camera)?;
     let joints = rendered.reported_joints();
     files::write_joints(&folder.join("joints_measured.csv"), joints.into_iter())?;
     let mut stamps = String::from("frame,sequence,monotonic_ns\n");

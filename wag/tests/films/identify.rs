@@ -4,7 +4,6 @@
 use super::support::{are_refused_in, calibrate, has, said, wag_in};
 use arm_model::Limits;
 use arm_model::Pole;
-use camera_ingest::calib::VideoMode;
 use planner::ropes::{TRIAL_SALT, outside_rope, trial_rope};
 use planner::synthetic::{
     FilmTiming, KeypointLayout, Randomisation, film as film_rope, side_camera,
@@ -34,7 +33,7 @@ fn film(rope: &RopeParams, index: u64, folder: &Path) {
     .unwrap();
     let keypoints = serde_json::to_string(&filmed.track).unwrap();
     std::fs::write(folder.join("keypoints.json"), keypoints).unwrap();
-    calibrate(folder, &camera, VideoMode::Vga);
+    calibrate(folder, &camera);
     let mut joints = String::from("t,q1,q2,q3,q4,q5,q6,q7\n");
     for i in 0..2000 {
         let t_s = f64::from(i) * 0.004;

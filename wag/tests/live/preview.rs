@@ -6,7 +6,6 @@ use super::client::{Watch, read_answer};
 use super::support::{
     self, Running, alone, beside_others, calibrate, command, process_of, said, send,
 };
-use camera_ingest::calib::VideoMode;
 use rig_sim::CameraConfig;
 use rig_sim::wiggle_film::{WiggleFilm, joints};
 use rustix::process::Signal;
@@ -176,7 +175,7 @@ fn the_rope_is_found_in_a_wiggle_and_followed_whatever_happens_to_the_preview() 
     let _alone = alone();
     let folder = tempfile::tempdir().unwrap();
     let camera = CameraConfig::default().stereo_camera();
-    let camera = calibrate(folder.path(), &camera, VideoMode::Vga);
+    let camera = calibrate(folder.path(), &camera);
     let domain = format!("preview-film-{}", std::process::id());
     let _sweep = DomainSweep::new(&domain);
     let mut stage = Stage::new(&Bus::join(&domain).unwrap());
@@ -260,7 +259,7 @@ fn a_preview_alone_says_what_it_waits_for_and_needs_a_calibration() {
     assert_eq!(refused.status.code(), Some(1), "{}", said(&refused));
     assert!(said(&refused).contains("camera.toml"), "{}", said(&refused));
     let sees = CameraConfig::default().stereo_camera();
-    calibrate(folder.path(), &sees, VideoMode::Vga);
+    calibrate(folder.path(), &sees);
     let _sweep = DomainSweep::new(&domain);
     let bus = Bus::join(&domain).unwrap();
     let previews = bus.preview_subscriber().unwrap();

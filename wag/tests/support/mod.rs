@@ -6,7 +6,7 @@ pub(crate) mod missing;
 
 use arm_model::joint::START_POSE;
 use arm_model::{JointTrajectory, Limits};
-use camera_ingest::calib::{VideoMode, write_camera_toml, write_factory_conf};
+use camera_ingest::calib::keep_calibration;
 use rt_controller::control::{ControlState, Thresholds};
 use rt_controller::recording::{ChunkWriter, RecordedCycle, Snapshot};
 use run_log::{Channel, McapFile, files};
@@ -120,10 +120,9 @@ pub(crate) fn are_refused_in(folder: &Path, code: i32, cases: &str) {
 }
 
 /// The calibration of a camera, as `camera.toml` of a folder.
-pub(crate) fn calibrate(folder: &Path, camera: &StereoCamera, mode: VideoMode) -> PathBuf {
-    let (path, conf) = (folder.join("camera.toml"), Path::new("camera.conf"));
-    write_factory_conf(&folder.join(conf), camera, mode).unwrap();
-    write_camera_toml(&path, camera, mode, conf).unwrap();
+pub(crate) fn calibrate(folder: &Path, camera: &StereoCamera) -> PathBuf {
+    let path = folder.join("camera.toml");
+    keep_calibration(&path, camera).unwrap();
     path
 }
 
