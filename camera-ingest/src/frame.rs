@@ -197,6 +197,17 @@ impl StereoFrame {
         Ok(Self(frame))
     }
 
+    /// As V4L2 `YUYV`, rows without padding.
+    #[must_use]
+    pub fn to_yuyv(&self) -> Vec<u8> {
+        let Self(frame) = self;
+        let chroma = frame.cb.iter().zip(&frame.cr);
+        let pairs = frame.luma.chunks_exact(2).zip(chroma);
+        pairs
+            .flat_map(|(y, (cb, cr))| [y[0], *cb, y[1], *cr])
+            .collect()
+    }
+
     /// From one baseline JPEG. Chroma is kept as the mean of two neighbours.
     ///
     /// # Errors

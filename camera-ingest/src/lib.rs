@@ -19,6 +19,7 @@ pub mod live;
 pub mod overlay;
 pub mod preview;
 pub mod process;
+mod raw_film;
 pub mod score;
 pub mod source;
 pub mod still;

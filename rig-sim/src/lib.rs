@@ -30,6 +30,7 @@ pub mod wiggle_film;
 pub use camera::{CameraConfig, Resolution};
 pub use config::{RigConfig, RoomChoice, check};
 pub use error::RigError;
+pub use service::port_of_rig;
 pub use target::random_target;
 
 use nalgebra::Vector3;

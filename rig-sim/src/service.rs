@@ -6,8 +6,8 @@ use super::record::Record;
 use nalgebra::Vector3;
 use shared_types::MonotonicNs;
 use shared_types::ipc::message::{RigEvent, RigRequest, RigRpc};
-use shared_types::ipc::rpc::{Call, RpcServer};
-use shared_types::ipc::{Bus, IpcError};
+use shared_types::ipc::rpc::{Call, RpcClient, RpcServer};
+use shared_types::ipc::{Bus, DomainSweep, IpcError};
 use std::time::Duration;
 use xarm_sim::ArmPorts;
 
@@ -16,6 +16,30 @@ const PAUSE: Duration = Duration::from_millis(4);
 const TOO_MANY_SERVERS: &str = "ExceedsMaxSupportedServers";
 /// How long a question about the very last moments waits for physics.
 const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Longest wait for the rig's answer.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(5);
+
+/// The command port of the rig that runs in a shared-memory domain, if one does.
+///
+/// # Errors
+/// The name is none, shared memory cannot be used, or what runs there does not answer.
+pub fn port_of_rig(domain: &str) -> Result<Option<u16>, IpcError> {
+    // Removed last: it looks for others in the domain.
+    let _sweep = DomainSweep::new(domain);
+    let bus = Bus::join(domain)?;
+    let asked = match RpcClient::<RigRpc>::open(&bus)?.call(&RigRequest::Ports) {
+        Ok(asked) => asked,
+        Err(IpcError::Gone { .. }) => return Ok(None),
+        Err(error) => return Err(error),
+    };
+    match asked.finish::<IpcError>(ANSWERED_WITHIN, || Ok(()), |_| ())? {
+        RigEvent::Ports { command, .. } => Ok(Some(command)),
+        other => Err(IpcError::Failed(format!(
+            "the rig of domain `{domain}` answered with {other:?}"
+        ))),
+    }
+}
 
 /// The rig's end of its service; stays in the thread that opened it.
 pub(super) struct Service {

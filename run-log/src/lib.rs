@@ -37,6 +37,7 @@ mod page;
 mod run;
 mod run_record;
 mod tracked_film;
+mod unconfirmed;
 
 pub use clamp_motion::ClampMotion;
 pub use command_line::{CommandLine, quoted};
@@ -49,6 +50,7 @@ pub use mcap_file::{
     RunFileThread, RunFilm, RunPart, SimulateRope, left_jpeg, record, recover,
 };
 pub use page::show;
-pub use run::{CellHere, NoRecording, Recording, Run};
+pub use run::{CellHere, Colours, NoRecording, Recording, Run};
 pub use run_record::{Film, MotionSpan, RunRecord, Settled, StageTimes, Tracked};
 pub use tracked_film::TrackedFilm;
+pub use unconfirmed::confirm;

@@ -9,8 +9,11 @@ use nalgebra::Vector3;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde_json::Value;
 use shared_types::ipc::message::ScoreResult;
-use shared_types::{Plan, RopeParams};
+use shared_types::{Plan, RopeParams, Task};
 use std::path::{Path, PathBuf};
+
+/// Colours of tip and target, as far as they are known.
+pub type Colours = [Option<[u8; 3]>; 2];
 
 /// A run. What a folder does not hold is `None`; what it holds and is damaged is an error
 /// that names the file.
@@ -174,12 +177,57 @@ impl Run {
         Ok(summary)
     }
 
+    /// The figures of a run that threw a strike.
+    ///
+    /// # Errors
+    /// As [`Self::summary_of_throw`]; its throw was no strike.
+    pub fn summary_of_strike(&self) -> Result<Value> {
+        let summary = self.summary_of_throw()?;
+        let task = self.plan()?.map_or(Task::Strike, |plan| plan.task);
+        ensure!(
+            task == Task::Strike,
+            "`{}` is the run of a {}, whose verdict by camera is in its {}: the distance of tip and \
+             target is measured of strikes",
+            self.folder.display(),
+            task.name(),
+            files::SUMMARY
+        );
+        Ok(summary)
+    }
+
+    /// Colours of tip and target by which its throw was, or was to be, measured.
+    pub fn colours(&self) -> Result<Colours> {
+        let summary = self.summary()?.unwrap_or_default();
+        let colour = |value: &Value| serde_json::from_value(value.clone()).ok();
+        let tip_rgb = colour(&summary["tip_rgb"]).or_else(|| colour(&summary["track"]["lead_rgb"]));
+        Ok([tip_rgb, colour(&summary["target_rgb"])])
+    }
+
+    /// The film of its throw, both images, which it has where it was to keep its films.
+    pub fn throw_film(&self) -> Result<PathBuf> {
+        let prefix = format!("{}_", files::THROW_FILM);
+        let is_film = |path: &PathBuf| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            name.starts_with(&prefix) && name.ends_with(".yuyv")
+        };
+        // A run that is named by its file may lie in the current folder, whose name is empty.
+        let folder = self.folder.join(".");
+        let listed = std::fs::read_dir(&folder).map_err(cannot_read(&folder))?;
+        let paths = listed.filter_map(|entry| Some(entry.ok()?.path()));
+        paths.filter(is_film).min().with_context(|| {
+            format!(
+                "`{}` holds no film of its throw, as `wag run --keep-films` keeps it: name one with --video",
+                self.folder.display()
+            )
+        })
+    }
+
     /// Keeps what a camera measured of its throw among its figures, in place of what is there.
     ///
     /// # Errors
-    /// As [`Self::summary_of_throw`]; the film shows another target than the plan's.
+    /// As [`Self::summary_of_strike`]; the film shows another target than the plan's.
     pub fn keep_score(&self, score: &ScoreResult) -> Result<()> {
-        let mut summary = self.summary_of_throw()?;
+        let mut summary = self.summary_of_strike()?;
         let file = self.folder.join(files::SUMMARY);
         if let Some(plan) = self.plan()? {
             require_same_target(&file, score.target_m, plan.target_m)?;

@@ -68,21 +68,21 @@ fn draw_rope(picture: &mut Picture, tracked: &TrackedFrame, place: &dyn Fn([f64;
     }
 }
 
-/// Contact sheet of chosen frames, `columns` a row, each with its keypoints and its time: the
+/// Contact sheet of frames all through a film, each with its keypoints and its time: the
 /// part of the image in which the rope moves, the same in all of them.
 ///
 /// # Errors
-/// No frame chosen.
+/// There is no frame.
 pub fn keypoint_sheet(
     frames: &[ImageFrame],
     track: &KeypointTrack,
-    chosen: &[usize],
-    columns: usize,
 ) -> Result<Picture, OverlayError> {
-    let shown: Vec<(&ImageFrame, &TrackedFrame)> = chosen
-        .iter()
-        .filter_map(|&i| Some((frames.get(i)?, track.frames.get(i)?)))
-        .collect();
+    /// Pictures in the sheet, and how many stand in a row.
+    const SHEET: (usize, usize) = (12, 4);
+    let (pictures, columns) = SHEET;
+    let step = frames.len().div_ceil(pictures).max(1);
+    let tracked = frames.iter().zip(&track.frames);
+    let shown: Vec<(&ImageFrame, &TrackedFrame)> = tracked.step_by(step).collect();
     let points = shown.iter().flat_map(|(_, tracked)| &tracked.points);
     let Some((first, _)) = shown.first() else {
         return contact_sheet(&[], columns);

@@ -89,12 +89,7 @@ impl Recording {
         self.last_sequence = frame.0.sequence;
         self.last_stamp_ns = frame.0.stamp_ns;
         match &mut self.frames {
-            Frames::Film(film) => {
-                if Film::needs_right(film.left.len(), self.wanted as usize) {
-                    film.right.push(frame.right());
-                }
-                film.left.push(frame.left());
-            }
+            Frames::Film(film) => film.add(&frame, self.wanted as usize),
             Frames::Both(v) => v.push(frame),
         }
         u32::try_from(self.count()).unwrap_or(u32::MAX)
@@ -110,8 +105,15 @@ impl Recording {
         })
     }
 
-    /// The frames for the tracker, if that is what was kept.
-    pub(super) fn film(&self) -> Option<Film<'_>> {
+    /// The frames for the tracker. Right images that it does not look at are let go.
+    pub(super) fn film(&mut self) -> Option<Film<'_>> {
+        if let Frames::Both(both) = &mut self.frames {
+            let mut film = BothImages::default();
+            for frame in std::mem::take(both) {
+                film.add(&frame, self.wanted as usize);
+            }
+            self.frames = Frames::Film(film);
+        }
         match &self.frames {
             Frames::Film(film) if !film.left.is_empty() => Some(film.film()),
             Frames::Film(_) | Frames::Both(_) => None,
@@ -189,8 +191,11 @@ mod tests {
         let mut r = Recording::begin(2, true);
         r.keep(frame(1));
         r.keep(frame(2));
-        assert!(r.has_both() && r.film().is_none());
+        assert!(r.has_both());
         assert_eq!(r.read(1).unwrap(), frame(2));
         assert!(r.read(2).is_err());
+        let film = r.film().map(|f| (f.left.to_vec(), f.right.len()));
+        assert_eq!(film, Some((vec![frame(1).left(), frame(2).left()], 2)));
+        assert!(!r.has_both(), "the tracker has them now");
     }
 }

@@ -37,6 +37,29 @@ const STILL_FRAMES: usize = 30;
 /// How long the camera may be silent before a recording fails (s).
 const CAMERA_SILENT_S: f64 = 2.0;
 
+/// Frames per second that films of runs are made with.
+pub const RATE_HZ: u32 = 60;
+/// Part by which a camera's rate may differ: a film of a wiggle must not outlast its joints.
+const RATE_TOLERANCE: f64 = 0.04;
+
+/// What is said of a film that was recorded at another rate than [`RATE_HZ`].
+#[must_use]
+pub fn at_another_rate(event: &CameraEvent) -> Option<String> {
+    let CameraEvent::Recorded { rate_hz: hz, .. } = event else {
+        return None;
+    };
+    // Its numbers began anew meanwhile.
+    if *hz <= 0.0 {
+        return Some("the camera was started anew while it filmed: start it, then the run".into());
+    }
+    let is_off = (hz / f64::from(RATE_HZ) - 1.0).abs() > RATE_TOLERANCE;
+    is_off.then(|| {
+        format!(
+            "the camera took {hz:.0} frames a second, not {RATE_HZ}: start it at that rate; in dim light give it a fixed exposure (`[live]` of camera.toml)"
+        )
+    })
+}
+
 /// Runs until `stop` is set.
 ///
 /// # Errors
@@ -55,7 +78,7 @@ pub fn run(config: &CameraConfig, stop: &AtomicBool) -> Result<(), IpcError> {
     tracing::info!(domain = config.domain, "camera-ingest is ready");
     while !stop.load(Ordering::Relaxed) {
         match server.receive() {
-            Ok(Some(call)) => process.accept(call),
+            Ok(Some(call)) => process.accept(call, stop),
             Ok(None) => {}
             Err(e @ IpcError::Message { .. }) => tracing::warn!("{e}"),
             Err(e) => return Err(e),
@@ -92,7 +115,7 @@ struct Process {
 }
 
 impl Process {
-    fn accept(&mut self, call: Call<CameraRpc>) {
+    fn accept(&mut self, call: Call<CameraRpc>, stop: &AtomicBool) {
         let now = Instant::now();
         let waiting = match &call.request {
             CameraRequest::Ping => return answer(&call, &CameraEvent::Pong),
@@ -100,8 +123,12 @@ impl Process {
                 let busy = "camera-ingest is busy with another request; wait for its end";
                 return answer(&call, &failed(busy));
             }
+            CameraRequest::Keep { name } => {
+                let kept = work::keep(&mut self.recording, name, stop);
+                return answer(&call, &kept.unwrap_or_else(failed));
+            }
             CameraRequest::Track { .. } => {
-                let tracked = work::track(&self.recording, &call, &self.keypoints);
+                let tracked = work::track(&mut self.recording, &call, &self.keypoints);
                 return answer(&call, &tracked.unwrap_or_else(failed));
             }
             CameraRequest::Score { .. } => {

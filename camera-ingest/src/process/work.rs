@@ -3,7 +3,8 @@
 use super::answer::answer;
 use super::keep::Recording;
 use crate::frame::ImageFrame;
-use crate::overlay::{OverlayError, Strike, keypoint_sheet, throw_picture};
+use crate::overlay::{Strike, keypoint_sheet, throw_picture};
+use crate::raw_film::RawFilm;
 use crate::score::Score;
 use crate::source::{FrameSource, StereoSource};
 use crate::track::TrackResult;
@@ -16,10 +17,8 @@ use shared_types::ipc::rpc::Call;
 use shared_types::keypoints::KeypointFrame;
 use shared_types::{MonotonicNs, StereoCamera};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-
-/// Pictures in a contact sheet, and how many stand in a row.
-const SHEET: (usize, usize) = (12, 4);
 
 /// How far a film is shown of a strike that was not measured, and of a throw after which the rope
 /// comes to rest (s).
@@ -28,9 +27,28 @@ const RESTS_S: f64 = 3.0;
 
 type Failure = Box<dyn std::error::Error>;
 
+/// Writes the recording of both images as a raw film, unless it is told to stop meanwhile.
+pub(super) fn keep(
+    recording: &mut Recording,
+    name: &str,
+    stop: &AtomicBool,
+) -> Result<CameraEvent, Failure> {
+    let first = recording.read(0)?.0;
+    let mut raw = RawFilm::create(Path::new(name), [first.width_px, first.height_px])?;
+    for index in 0..recording.len() {
+        if stop.load(Ordering::Relaxed) {
+            return Err("stopped before the film was written".into());
+        }
+        let frame = recording.read(index)?;
+        raw.push(&frame.to_yuyv(), frame.0.sequence, frame.0.stamp_ns)?;
+    }
+    raw.finish()?;
+    Ok(CameraEvent::Kept)
+}
+
 /// Tracks the rope and publishes its keypoints.
 pub(super) fn track(
-    recording: &Recording,
+    recording: &mut Recording,
     call: &Call<CameraRpc>,
     publisher: &KeypointPublisher,
 ) -> Result<CameraEvent, Failure> {
@@ -44,9 +62,9 @@ pub(super) fn track(
     else {
         return Err("not a request to track".into());
     };
-    let film = recording
-        .film()
-        .ok_or("nothing is recorded for tracking; record first, for the tracker")?;
+    let first_stamp_ns = recording.first_stamp_ns();
+    let film = recording.film();
+    let film = film.ok_or("nothing is recorded for tracking; record first")?;
     let frames = film.left;
     let progress = Progress {
         done: 0,
@@ -56,12 +74,12 @@ pub(super) fn track(
     };
     answer(call, &CameraEvent::Progress(progress));
     let began = Instant::now();
-    let motion = attach_motion(joints, recording.first_stamp_ns(), pole)?;
+    let motion = attach_motion(joints, first_stamp_ns, pole)?;
     let result = crate::track::track(film, camera, &motion, *keypoints as usize)?;
     let ms_per_frame = began.elapsed().as_secs_f64() * 1e3 / frames.len() as f64;
     publish(frames, &result, publisher)?;
     if let Some(path) = overlay {
-        write_sheet(frames, &result, Path::new(path))?;
+        keypoint_sheet(frames, &result.track)?.write_png(Path::new(path))?;
     }
     let appearance = RopeAppearance {
         rope_radius_m: Some(result.appearance.rope_radius_m),
@@ -70,7 +88,7 @@ pub(super) fn track(
         lead_rgb: result.appearance.lead_rgb,
     };
     Ok(CameraEvent::Tracked {
-        first_stamp_ns: recording.first_stamp_ns(),
+        first_stamp_ns,
         frames: u32::try_from(frames.len())?,
         lost_fraction: result.track.lost_fraction(),
         appearance,
@@ -103,16 +121,6 @@ fn publish(
         sample.send().map_err(|e| format!("{e:?}"))?;
     }
     Ok(())
-}
-
-fn write_sheet(
-    frames: &[ImageFrame],
-    result: &TrackResult,
-    path: &Path,
-) -> Result<(), OverlayError> {
-    let step = frames.len().div_ceil(SHEET.0).max(1);
-    let chosen: Vec<usize> = (0..frames.len()).step_by(step).collect();
-    keypoint_sheet(frames, &result.track, &chosen, SHEET.1)?.write_png(path)
 }
 
 /// Measures the closest approach in a throw.

@@ -77,6 +77,14 @@ pub struct BothImages {
 }
 
 impl BothImages {
+    /// Adds the next of a film's `count` frames.
+    pub(crate) fn add(&mut self, frame: &StereoFrame, count: usize) {
+        if Film::needs_right(self.left.len(), count) {
+            self.right.push(frame.right());
+        }
+        self.left.push(frame.left());
+    }
+
     /// For the tracker.
     #[must_use]
     pub fn film(&self) -> Film<'_> {

@@ -37,5 +37,9 @@ pub const CAMERA: &str = "camera.toml";
 pub const KEYPOINTS: &str = "keypoints.json";
 /// File of a run folder with the identified rope.
 pub const ROPE: &str = "params.toml";
+/// Films of a run folder, if they are kept: `NAME_WIDTHxHEIGHT.yuyv`, times in a CSV beside each.
+pub const WIGGLE_FILM: &str = "wiggle";
+/// That of the throw.
+pub const THROW_FILM: &str = "throw";
 /// File of a run folder with the plan of the throw.
 pub const PLAN: &str = "plan.json";

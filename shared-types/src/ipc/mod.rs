@@ -28,6 +28,8 @@ mod boards;
 mod bus;
 #[cfg(feature = "std")]
 mod bytes;
+#[cfg(feature = "std")]
+mod camera;
 mod cause;
 #[cfg(feature = "std")]
 mod domain;

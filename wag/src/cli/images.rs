@@ -17,6 +17,10 @@ pub struct CameraArgs {
     /// of configurations (~/.config/wag); a simulated rig tells its own.
     #[arg(long, value_name = "FILE", requires = "camera")]
     pub calibration: Option<PathBuf>,
+    /// Keep the films of wiggle and throw whole, both images, in the run's folder: 1 MB a frame
+    /// of 672x376, 0.6 GB a run; else it keeps the left image as JPEG at half the rate.
+    #[arg(long, requires = "camera")]
+    pub keep_films: bool,
 }
 
 #[derive(Debug, Args)]
@@ -102,15 +106,22 @@ pub struct StereoArgs {
 
 #[derive(Debug, Args)]
 pub struct ScoreArgs {
-    #[command(flatten)]
-    pub film: StereoArgs,
-    /// Colour of the tip, R,G,B from 0 to 255.
-    #[arg(long)]
-    pub tip_rgb: Colour,
-    /// Colour of the target, R,G,B from 0 to 255.
-    #[arg(long)]
-    pub target_rgb: Colour,
-    /// Folder of the throw's run (`wag throw`): it keeps the miss, for `wag throw --again`.
+    /// The film, as `wag track` takes it. Default: that of the throw, of a run with --keep-films.
+    #[arg(long, required_unless_present = "run")]
+    pub video: Option<PathBuf>,
+    /// Frames per second, for a recording that does not tell its frames' times.
+    #[arg(long, value_parser = rate_hz, requires = "video")]
+    pub fps: Option<f64>,
+    /// Camera calibration and extrinsics. Default: the run's.
+    #[arg(long, required_unless_present = "run")]
+    pub camera: Option<PathBuf>,
+    /// Colour of the tip, R,G,B from 0 to 255. Default: the run's.
+    #[arg(long, required_unless_present = "run")]
+    pub tip_rgb: Option<Colour>,
+    /// Colour of the target, R,G,B from 0 to 255. Default: the run's.
+    #[arg(long, required_unless_present = "run")]
+    pub target_rgb: Option<Colour>,
+    /// Folder of the throw's run: it keeps the miss, for `--again`.
     #[arg(long, value_name = "RUN")]
     pub run: Option<PathBuf>,
 }

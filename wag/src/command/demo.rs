@@ -65,6 +65,7 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
             rig: Some(rig),
             accept_unconfirmed: args.accept_unconfirmed,
             robust: 0,
+            keeps_films: false,
         };
         Run::start(&folder, session, record, setup, &stage)?.go(entry)
     })

@@ -33,7 +33,6 @@ mod sim;
 mod studio;
 mod throw;
 mod track;
-mod unconfirmed;
 mod watch;
 mod wiggle;
 mod wiggle_design;

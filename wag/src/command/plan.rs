@@ -1,7 +1,6 @@
 //! `wag plan`: from a rope and a target to a checked plan.
 
 use super::known_rope::KnownRope;
-use super::unconfirmed::confirm;
 use crate::cli::{PlanArgs, PlannerArgs};
 use crate::config;
 use anyhow::bail;
@@ -12,7 +11,7 @@ use planner::arm_response::Following;
 use planner::plan::{
     PlanError, PlanOptions, PlanRequest, ReachMap, Shortcoming, clear_of_arm, shortcoming, warnings,
 };
-use run_log::files;
+use run_log::{confirm, files};
 use serde_json::{Value, json};
 use shared_types::{Plan, RopeParams, Task};
 use std::path::Path;

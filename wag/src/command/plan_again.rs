@@ -1,7 +1,6 @@
 //! `wag plan again`: the last strike, corrected by its miss.
 
 use super::plan::{LOOK, check_fault, classify, describe, read, tell};
-use super::unconfirmed::confirm;
 use crate::cli::{AgainArgs, Point};
 use crate::config;
 use anyhow::anyhow;
@@ -10,7 +9,7 @@ use cli_output::{OrInput, Outcome, Stage};
 use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::plan::{PlanRequest, Shortcoming, correction, plan_again, shortcoming, warnings};
-use run_log::{Run, files};
+use run_log::{Run, confirm, files};
 use serde_json::{Value, json};
 use shared_types::{Plan, Task};
 use std::path::Path;

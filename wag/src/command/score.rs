@@ -1,12 +1,14 @@
 //! `wag score`: closest approach of tip and target from stereo video.
 
+use super::run::UNNAMED_COLOURS;
 use crate::cli::ScoreArgs;
+use anyhow::Context;
 use camera_ingest::{ScoreError, load_camera, open_video, score};
 use cli_output::{Failure, OrInput, Outcome, Stage};
 use run_log::{Run, files};
 use serde_json::{Value, json};
 use shared_types::ipc::message::ScoreResult;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Bad input, or a marker that was looked for and not found.
 pub fn not_scored(error: ScoreError, video: &Path) -> Failure {
@@ -14,18 +16,35 @@ pub fn not_scored(error: ScoreError, video: &Path) -> Failure {
     Failure::of(error.is_input(), anyhow::Error::new(error).context(video))
 }
 
+/// The film and the camera's file: those that are named, else what the run keeps of its throw.
+fn filmed(args: &ScoreArgs, run: Option<&Run>) -> anyhow::Result<(PathBuf, PathBuf)> {
+    let kept = || run.context("name film and camera with --video and --camera, or --run");
+    let camera = match &args.camera {
+        Some(camera) => camera.clone(),
+        None => kept()?.folder().join(files::CAMERA),
+    };
+    let video = args.video.clone().map_or_else(|| kept()?.throw_film(), Ok);
+    Ok((video?, camera))
+}
+
 pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     let run = args.run.as_deref().map(Run::open).transpose().or_input()?;
     // One that cannot keep a score is refused before anything is measured.
     if let Some(run) = &run {
-        run.summary_of_throw().or_input()?;
+        run.summary_of_strike().or_input()?;
         files::check_writable(&run.folder().join(files::SUMMARY)).or_input()?;
     }
-    let camera = load_camera(&args.film.camera).or_input()?;
-    let mut video = open_video(&args.film.video, args.film.fps).or_input()?;
+    let of_run = run.as_ref().map(Run::colours).transpose().or_input()?;
+    let named = [args.tip_rgb, args.target_rgb].map(|colour| colour.map(|named| named.0));
+    let [tip_rgb, target_rgb] = [0, 1].map(|i| named[i].or(of_run.and_then(|of| of[i])));
+    let known = tip_rgb.zip(target_rgb).context(UNNAMED_COLOURS);
+    let (tip_rgb, target_rgb) = known.or_input()?;
+    let (video, camera) = filmed(args, run.as_ref()).or_input()?;
+    let camera = load_camera(&camera).or_input()?;
+    let mut frames = open_video(&video, args.fps).or_input()?;
     let stage = Stage::begin("score");
-    let found = score(&mut video, &camera, args.tip_rgb.0, args.target_rgb.0)
-        .map_err(|error| not_scored(error, &args.film.video))?;
+    let found = score(&mut frames, &camera, tip_rgb, target_rgb)
+        .map_err(|error| not_scored(error, &video))?;
     let [x, y, z] = found.miss_m;
     let line = format!(
         "closest approach {:.1} mm ({:.1} to {:.1}) at {:.4} s; miss {x:.4},{y:.4},{z:.4} m (tip minus target)",

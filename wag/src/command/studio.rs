@@ -28,7 +28,8 @@ fn reached_by(args: &StudioArgs) -> Vec<String> {
     let given = named
         .into_iter()
         .filter_map(|(option, v)| Some([option.to_owned(), v?]));
-    given.flatten().collect()
+    let keeps = args.camera.keep_films.then(|| "--keep-films".to_owned());
+    given.flatten().chain(keeps).collect()
 }
 
 pub fn run(cli: &Cli, args: &StudioArgs) -> Outcome<Option<Value>> {

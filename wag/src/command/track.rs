@@ -14,9 +14,6 @@ use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, MonotonicNs};
 use std::path::Path;
 
-/// Pictures in a contact sheet, and how many stand in a row.
-const SHEET: (usize, usize) = (12, 4);
-
 /// Tracks the rope through a film; a learned tracker reads it where there is one. The
 /// left-eye frames, and what was found in them.
 pub fn track_video(
@@ -55,9 +52,7 @@ pub fn overlay(
     {
         return keypoint_film(frames, track);
     }
-    let step = frames.len().div_ceil(SHEET.0).max(1);
-    let chosen: Vec<usize> = (0..frames.len()).step_by(step).collect();
-    keypoint_sheet(frames, track, &chosen, SHEET.1)?.to_png()
+    keypoint_sheet(frames, track)?.to_png()
 }
 
 /// Clocks so many standard errors apart are not together.

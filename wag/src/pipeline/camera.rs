@@ -3,7 +3,7 @@
 
 use super::{RunFolder, start};
 use crate::config;
-use anyhow::{anyhow, bail};
+use anyhow::bail;
 use camera_ingest::calib::{load_camera, load_exposure};
 use camera_ingest::live::{CameraConfig, Exposure, LiveSettings};
 use camera_ingest::process::CameraConfig as IngestConfig;
@@ -11,12 +11,8 @@ use session::{ProcessSpec, Session};
 use shared_types::StereoCamera;
 use shared_types::ipc::message::{CameraRequest, CameraRpc, RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::RpcClient;
-use shared_types::ipc::{Bus, DomainSweep, IpcError};
 use std::path::Path;
-use std::time::Duration;
 
-/// Longest wait for a simulated rig.
-const ANSWERED_WITHIN: Duration = Duration::from_secs(5);
 /// Where frames come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FramesFrom {
@@ -86,26 +82,5 @@ pub fn start_camera(
             &IngestConfig { domain },
             &ping,
         ),
-    }
-}
-
-/// The command port of the simulated rig that runs in a shared-memory domain, if one does.
-///
-/// # Errors
-/// The name is none, or shared memory cannot be used.
-pub fn port_of_rig(domain: &str) -> anyhow::Result<Option<u16>> {
-    // Removed last: it looks for others in the domain.
-    let _sweep = DomainSweep::new(domain);
-    let bus = Bus::join(domain)?;
-    let asked = match RpcClient::<RigRpc>::open(&bus)?.call(&RigRequest::Ports) {
-        Ok(asked) => asked,
-        Err(IpcError::Gone { .. }) => return Ok(None),
-        Err(error) => return Err(error.into()),
-    };
-    match asked.finish::<anyhow::Error>(ANSWERED_WITHIN, || Ok(()), |_| ())? {
-        RigEvent::Ports { command, .. } => Ok(Some(command)),
-        other => Err(anyhow!(
-            "the rig of domain `{domain}` answered with {other:?}"
-        )),
     }
 }

@@ -10,7 +10,7 @@ mod service;
 pub use arm::{
     ArmLink, BringUp, acquire, arm_for, arm_simulated, enable, execute, latency, move_to,
 };
-pub use camera::{FramesFrom, Scene, port_of_rig, start_camera};
+pub use camera::{FramesFrom, Scene, start_camera};
 pub use processes::{ArmAddress, controller, rig_config, start, start_recorder, start_rig};
 pub use run_folder::RunFolder;
 pub use service::Service;

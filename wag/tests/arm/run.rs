@@ -27,7 +27,7 @@ fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_the
 
     let done = json_in(
         here,
-        &format!("run strike {arm} --camera {domain} --out run"),
+        &format!("run strike {arm} --camera {domain} --keep-films --out run"),
     );
     let missed_m = done["true_tip_target_distance_m"].as_f64().unwrap();
     assert!(missed_m < 0.02, "{missed_m} m");
@@ -43,6 +43,21 @@ fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_the
         length_m(&again["rope"]),
     );
     assert!((first - second).abs() < 5e-3, "{first} and {second} m");
+
+    // The films are kept whole: the throw is measured again from its own, and gives the same;
+    // the wiggle's is tracked again with the joints of the run, which count from its first frame.
+    let score = json_in(here, "score --run run");
+    let closest_m = |score: &Value| score["closest_m"].as_f64().unwrap();
+    assert!((closest_m(&score) - closest_m(&done["score"])).abs() < 1e-6);
+    json_in(here, "export csv run");
+    let track = "track --video run/wiggle_1344x376.yuyv --camera run/camera.toml --joints run/joints.csv --out again.json";
+    assert_eq!(json_in(here, track)["frames"], 400);
+    let retracked = json_in(
+        here,
+        "identify --keypoints again.json --camera run/camera.toml --joints run/joints.csv --out fourth.toml",
+    );
+    let fourth = length_m(&retracked["rope"]);
+    assert!((first - fourth).abs() < 2e-3, "{first} and {fourth} m");
 
     // A wiggle by itself films too, and all after it begins from its folder. The rope of this rig
     // swings for minutes now, the same one of another hangs still.
@@ -95,6 +110,9 @@ fn a_lob_is_thrown_with_an_arm_and_a_camera_that_are_there_and_judged_as_it_is()
     assert_eq!(true_["success"], true, "{true_}");
     assert_eq!(seen["success"], true, "{seen} {}", done["score_failed"]);
     assert_eq!(seen["conditions"], true_["conditions"]);
+    // Its distance to a target is not what it was for.
+    let refused = refused_in(folder.path(), 2, "score --run run");
+    assert!(refused.contains("the run of a lob"), "{refused}");
 }
 
 /// The wall is put up, the rope thrown over it, filmed, and judged by camera and truth alike.

@@ -19,14 +19,6 @@ use std::path::Path;
 /// Frames of a recording that are enough to follow the rope.
 const FRAMES: usize = 120;
 
-fn yuyv(frame: &StereoFrame) -> Vec<u8> {
-    let chroma = frame.0.cb.iter().zip(&frame.0.cr);
-    let pairs = frame.0.luma.chunks_exact(2).zip(chroma);
-    pairs
-        .flat_map(|(y, (cb, cr))| [y[0], *cb, y[1], *cr])
-        .collect()
-}
-
 /// Bodies of the first pictures of an AVI.
 fn jpegs(avi: &[u8], count: usize) -> Vec<&[u8]> {
     let word = |at: usize| u32::from_le_bytes(avi[at..at + 4].try_into().unwrap()) as usize;
@@ -57,7 +49,7 @@ fn excerpt(from: &Path) -> tempfile::TempDir {
     let mut raw = Vec::new();
     for (index, jpeg) in jpegs(&avi, FRAMES).into_iter().enumerate() {
         fs::write(at(&format!("f{index:04}.jpg")), jpeg).unwrap();
-        raw.extend(yuyv(&StereoFrame::from_jpeg(jpeg, 0, 0).unwrap()));
+        raw.extend(StereoFrame::from_jpeg(jpeg, 0, 0).unwrap().to_yuyv());
     }
     fs::write(at("raw_1344x376.yuyv"), raw).unwrap();
     dir
@@ -150,7 +142,7 @@ pub(super) fn film_of(
 ) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
-    let raw: Vec<u8> = frames.iter().flat_map(yuyv).collect();
+    let raw: Vec<u8> = frames.iter().flat_map(StereoFrame::to_yuyv).collect();
     let size = format!("{}x{}", 2 * camera.width_px, camera.height_px);
     fs::write(at(&format!("film_{size}.yuyv")), raw).unwrap();
     write_factory_conf(&at("sn.conf"), camera, mode).unwrap();

@@ -6,6 +6,7 @@ use crate::command::motion;
 use crate::pipeline::{self, execute};
 use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::JointTrajectory;
+use camera_ingest::process::{RATE_HZ, at_another_rate};
 use cli_output::Stage;
 use planner::arm_response::Following;
 use planner::plan::{Shortcoming, ThrowGoal, judge_seen, shortcoming};
@@ -18,10 +19,6 @@ use std::time::Duration;
 
 /// Frames of a wiggle (paper: 400 at 60 Hz).
 const WIGGLE_FRAMES: u32 = 400;
-/// Frames per second, for which the lengths of the films are made.
-pub const RATE_HZ: u32 = 60;
-/// Part by which a camera's rate may differ: a film of a wiggle must not outlast its joints.
-const RATE_TOLERANCE: f64 = 0.04;
 /// Frames of a strike: two and a half seconds.
 const STRIKE_FRAMES: u32 = 150;
 /// Time after the last setpoint that still belongs to a strike (s).
@@ -31,19 +28,10 @@ const PLACED_WITHIN: Duration = Duration::from_secs(900);
 /// From the first frame of a film to the motion's begin, at most (s).
 const BEFORE_THROW_S: f64 = 0.4;
 
-/// What is said of a film at another rate than its length is for. That of a throw is kept.
-fn at_another_rate(event: &CameraEvent) -> Option<String> {
-    let CameraEvent::Recorded { rate_hz: hz, .. } = event else {
-        return None;
-    };
-    let is_off = (hz / f64::from(RATE_HZ) - 1.0).abs() > RATE_TOLERANCE;
-    is_off.then(|| format!("the camera took {hz:.0} frames a second, not {RATE_HZ}: start it at that rate; in dim light give it a fixed exposure (`[live]` of camera.toml)"))
-}
-
 impl Run<'_> {
     /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
     /// finished whatever becomes of the film, of both eyes. A wiggle is made for the film's
-    /// sake, which needs the left eye only, and is braked when the process that keeps it ends.
+    /// sake, of which the left eye is enough, and is braked when the process that keeps it ends.
     fn film(
         &mut self,
         frames: u32,
@@ -53,7 +41,7 @@ impl Run<'_> {
     ) -> anyhow::Result<Film> {
         let request = CameraRequest::Record {
             frames,
-            both_images: throw,
+            both_images: throw || self.setup.keeps_films,
         };
         let recording = self.camera.call(&request)?;
         let first_stamp_ns = match answered(self.session.next(&recording, 5.0)?)? {
@@ -100,6 +88,24 @@ impl Run<'_> {
         })
     }
 
+    /// Keeps the film whole, if films are kept. One that cannot be written undoes nothing.
+    pub fn keep_film(&mut self, name: &str) -> anyhow::Result<()> {
+        if !self.setup.keeps_films {
+            return Ok(());
+        }
+        let stage = Stage::begin("keep film");
+        let name = self.folder.file(name).display().to_string();
+        let request = CameraRequest::Keep { name };
+        let event = self.session.ask(&self.camera, &request, 600.0, |_| ())?;
+        if let CameraEvent::Failed { message } = event {
+            stage.failed("the film is not kept");
+            self.warn(&message);
+        } else {
+            stage.done("both images of every frame are in the run's folder");
+        }
+        Ok(())
+    }
+
     /// Streams the wiggle and films it.
     pub fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
         self.arm_for(OperatingMode::Wiggle)?;
@@ -107,6 +113,7 @@ impl Run<'_> {
         let film = self.film(WIGGLE_FRAMES, wiggle, false, &stage)?;
         self.record.set_wiggle(film);
         self.record.stages.wiggle_s = stage.done(&summary::of_film(&film));
+        self.keep_film(files::WIGGLE_FILM)?;
         Ok(film)
     }
 

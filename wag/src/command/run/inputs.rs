@@ -6,23 +6,19 @@ use crate::command::known_rope::KnownRope;
 use crate::command::plan::LOOK;
 use crate::command::plan_again::check_thrown;
 use crate::command::run::Entry;
-use crate::command::run::filmed::RATE_HZ;
-use crate::command::unconfirmed::confirm;
-use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene, port_of_rig};
+use crate::pipeline::{ArmAddress, FramesFrom, RunFolder, Scene};
 use camera_ingest::calib::VideoMode;
 use camera_ingest::live::LiveSettings;
+use camera_ingest::process::RATE_HZ;
 use cli_output::{Failure, OrInput, Outcome};
 use planner::PlannerConfig;
 use planner::plan::{check_reach, clear_of_arm};
-use run_log::Run as RecordedRun;
+use rig_sim::port_of_rig;
 use run_log::files::{self, read_plan};
-use serde_json::Value;
+use run_log::{Colours, Run as RecordedRun, confirm};
 use shared_types::rope::RANGES;
 use shared_types::{StereoCamera, Task};
 use std::path::{Path, PathBuf};
-
-/// Colours of tip and target, as far as they are known.
-type Colours = [Option<[u8; 3]>; 2];
 
 /// Camera, target and rope as they are named.
 #[derive(Debug)]
@@ -39,6 +35,7 @@ pub struct Inputs {
     pub colours: Colours,
     pub accept_unconfirmed: bool,
     pub robust: usize,
+    pub keeps_films: bool,
 }
 
 /// A target that is named must lie where a rope can strike.
@@ -121,14 +118,12 @@ fn earlier(args: &RunArgs) -> Outcome<(Option<Task>, Option<[f64; 3]>, Colours)>
     let run = RecordedRun::open(&folder).or_input()?;
     let plan = run.plan().or_input()?;
     let summary = run.summary().or_input()?.unwrap_or_default();
-    let colour = |value: &Value| serde_json::from_value(value.clone()).ok();
-    let tip_rgb = colour(&summary["tip_rgb"]).or_else(|| colour(&summary["track"]["lead_rgb"]));
     let target_m = serde_json::from_value(summary["target_m"].clone()).ok();
     let task = serde_json::from_value(summary["task"].clone()).ok();
     Ok((
         plan.as_ref().map(|plan| plan.task).or(task),
         plan.map(|plan| plan.target_m).or(target_m),
-        [tip_rgb, colour(&summary["target_rgb"])],
+        run.colours().or_input()?,
     ))
 }
 
@@ -180,6 +175,7 @@ impl Inputs {
             colours: [None; 2],
             accept_unconfirmed: false,
             robust: 0,
+            keeps_films: args.keep_films,
         })
     }
 

@@ -8,7 +8,7 @@ mod stages;
 mod summary;
 
 pub use inputs::check_target;
-pub use stages::{Entry, Run, Setup};
+pub use stages::{Entry, Run, Setup, UNNAMED_COLOURS};
 
 use super::area::{asks, limits, operator, reach_measured, require_clear_area, response_for_plans};
 use super::on_arm::{confirmations, watch_operator};
@@ -264,6 +264,7 @@ fn on_camera(
             rig,
             accept_unconfirmed: inputs.accept_unconfirmed,
             robust: inputs.robust,
+            keeps_films: inputs.keeps_films,
         };
         Run::start(&folder, session, record, setup, &stage)?.go(entry)
     };

@@ -4,7 +4,6 @@
 use super::stages::{Run, SETTLED_WITHIN_S, Setup};
 use crate::command::known_rope::KnownRope;
 use crate::command::plan::describe;
-use crate::command::unconfirmed::confirm;
 use crate::pipeline::{arm_for, execute};
 use anyhow::{Context, bail, ensure};
 use arm_model::{JointTrajectory, JointVector};
@@ -14,7 +13,7 @@ use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
 use planner::settle::SettleRequest;
 use rt_controller::control::arming::THROW_WITHIN_NS;
 use rt_controller::os::now_ns;
-use run_log::{Film, Settled, Tracked, files};
+use run_log::{Film, Settled, Tracked, confirm, files};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, RopeAppearance};
 use shared_types::{MonotonicNs, OperatingMode, Plan, RopeParams};
 use std::time::Duration;

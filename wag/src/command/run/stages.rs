@@ -30,7 +30,7 @@ pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 /// The same after any other move, where the swing of whatever was before decays by itself (s).
 const DECAYED_WITHIN_S: f64 = 180.0;
 /// What to do where the colours to look for are not known.
-pub(super) const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
+pub const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
 /// How often the camera is asked for frames before the arm is enabled.
 const LOOKS: usize = 4;
 
@@ -62,6 +62,8 @@ pub struct Setup {
     pub accept_unconfirmed: bool,
     /// Ropes that a plan weighs beside the likeliest.
     pub robust: usize,
+    /// Whether the films are kept whole, both images.
+    pub keeps_films: bool,
 }
 
 /// The running processes and what all stages need.
@@ -183,6 +185,9 @@ impl<'a> Run<'a> {
             self.score(&throw, &plan);
         }
         self.compare_with_truth(&throw, &plan)?;
+        if throw.frames > 0 {
+            self.keep_film(files::THROW_FILM)?;
+        }
         self.record.ok = true;
         Ok(())
     }

@@ -1,10 +1,14 @@
 //! An unconfirmed track ends the work that would rest on it, unless that is accepted.
 
-use anyhow::bail;
+use anyhow::{Result, bail};
+use cli_output::eprintln;
 
 /// Stops at an unconfirmed track; with `accepted` it is a warning only. `look` says where it
 /// can be looked at.
-pub fn confirm(unconfirmed: &[String], accepted: bool, look: &str) -> anyhow::Result<()> {
+///
+/// # Errors
+/// The track is unconfirmed, and nobody accepted that.
+pub fn confirm(unconfirmed: &[String], accepted: bool, look: &str) -> Result<()> {
     if unconfirmed.is_empty() {
         return Ok(());
     }
