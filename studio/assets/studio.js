@@ -181,7 +181,7 @@ function showWork(work) {
 async function showResult(work) {
   byId("result").hidden = false;
   byId("headline").textContent = work.is_ok ? work.headline || `Done: ${work.run}` : `Not done: ${work.error || "no reason is known"}`;
-  byId("headline").classList.toggle("bad", !work.is_ok);
+  byId("headline").classList.toggle("bad", !work.is_ok || /^Missed|^\w+ failed/.test(work.headline || ""));
   await history();
   const past = pastRuns.find((run) => run.name === work.run);
   byId("again").hidden = !(past && past.has_throw);

@@ -193,6 +193,8 @@ fn from_a_click_on_the_map_to_the_result() {
             .any(|said| headline.starts_with(said)),
         "{headline}"
     );
+    let is_red = page.value("byId('headline').classList.contains('bad')");
+    assert_eq!(is_red, headline.starts_with("Missed"), "{headline}");
     assert!(
         text(&mut page, "words").contains("nine of ten"),
         "the plan in words"
