@@ -20,6 +20,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+pub use crate::raw_film::FilmError;
 pub use camera::{LiveCamera, LiveFrame};
 pub use publish::{CameraConfig, PublishError, run};
 pub use record::{RecordError, Recorded, record};

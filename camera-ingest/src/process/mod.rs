@@ -240,3 +240,23 @@ fn decode(header: &FrameHeader, bytes: &[u8]) -> Result<StereoFrame, String> {
     )
     .map_err(|e| e.to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_film_at_another_rate_or_of_a_camera_started_anew_is_told() {
+        let told = |rate_hz| {
+            at_another_rate(&CameraEvent::Recorded {
+                first_stamp_ns: 0,
+                frames: 400,
+                dropped: 0,
+                rate_hz,
+            })
+        };
+        assert_eq!([59.0, 60.0, 61.0].map(told), [None, None, None]);
+        assert!(told(30.0).unwrap().contains("took 30 frames a second"));
+        assert!(told(0.0).unwrap().contains("started anew"));
+    }
+}

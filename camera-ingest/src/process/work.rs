@@ -205,3 +205,36 @@ fn write_throw(
     throw_picture(&frames, strike.as_ref(), unseen_s)?.write_png(path)?;
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::StereoFrame;
+    use crate::source::open_video;
+
+    #[test]
+    fn a_recording_is_kept_to_the_bit_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = || std::fs::read_dir(folder.path()).unwrap().count();
+        let name = folder.path().join("throw").display().to_string();
+        let frame = |number: u64| {
+            let bytes: Vec<u8> = (0..64).map(|k| number as u8 * 64 + k).collect();
+            StereoFrame::from_yuyv(&bytes, [8, 4], 1000 * number, number).unwrap()
+        };
+        let mut recording = Recording::begin(2, true);
+        let stop = AtomicBool::new(false);
+        assert!(keep(&mut recording, &name, &stop).is_err(), "it is empty");
+        recording.keep(frame(1));
+        recording.keep(frame(2));
+        stop.store(true, Ordering::Relaxed);
+        assert!(keep(&mut recording, &name, &stop).is_err());
+        stop.store(false, Ordering::Relaxed);
+        assert!(keep(&mut recording, &format!("{name}/of"), &stop).is_err());
+        assert_eq!(files(), 0, "nothing is left behind");
+        keep(&mut recording, &name, &stop).unwrap();
+        assert_eq!(files(), 2);
+        let mut film = open_video(Path::new(&format!("{name}_8x4.yuyv")), None).unwrap();
+        assert_eq!(film.len(), 2);
+        assert_eq!([0, 1].map(|i| film.read(i).unwrap()), [frame(1), frame(2)]);
+    }
+}
