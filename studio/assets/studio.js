@@ -31,7 +31,7 @@ const measured = (id) => (Number.isFinite(number(id)) ? number(id) : "");
 
 // The target: numbers, the map, the view.
 
-let reachWanted = false;
+let reachWanted = false, reachAsked = 0;
 async function reach() {
   if (reachWanted) return;
   reachWanted = true;
@@ -41,7 +41,10 @@ async function reach() {
   if (!Number.isFinite(z)) return;
   try {
     const values = Number.isFinite(x) && Number.isFinite(y) ? { x, y, z } : { z };
+    const mine = ++reachAsked;
     const found = await get("reach?" + query({ ...values, length_m: measured("length") }));
+    // An answer that was overtaken is about another target.
+    if (mine !== reachAsked) return;
     map = found.map;
     studio.objection = found.objection;
     const open = `Blue: where a rope ${measured("length") ? "of this length" : "of the longest kind"} may reach at this height.`;

@@ -158,13 +158,23 @@ impl Chromium {
         }
     }
 
-    /// The middle of an element in the window (CSS pixels), brought into view.
+    /// The middle of an element in the window (CSS pixels), brought into view and at rest:
+    /// what appears above it on the page moves it.
     pub(crate) fn middle_of(&mut self, id: &str) -> [f64; 2] {
-        let place = self.value(&format!(
-            "(() => {{ const e = document.getElementById('{id}'); e.scrollIntoView({{ block: 'center' }});
-             const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
-        ));
-        [0, 1].map(|i| place[i].as_f64().unwrap())
+        let began = Instant::now();
+        let mut place = Value::Null;
+        loop {
+            let now = self.value(&format!(
+                "(async () => {{ const e = document.getElementById('{id}'); e.scrollIntoView({{ block: 'center' }});
+                 await new Promise((drawn) => requestAnimationFrame(drawn));
+                 const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
+            ));
+            if now == place {
+                return [0, 1].map(|i| place[i].as_f64().unwrap());
+            }
+            assert!(began.elapsed() < PATIENCE, "{id} is never at rest: {now}");
+            place = now;
+        }
     }
 
     /// A mouse event: `mousePressed`, `mouseMoved`, `mouseReleased`.

@@ -32,19 +32,29 @@ fn open(page: &mut Chromium, url: &str) {
         "the view",
         "watched.drawn > 0 && beside.target_m !== undefined",
     );
+    // Above the map in a narrow window: it moves the map when it appears.
+    page.until("the camera's picture", "watched.pictures > 0");
 }
 
-/// Clicks on the map where a target means (x, y) m; the numbers beside it.
-fn click_target(page: &mut Chromium, [x, y]: [f64; 2]) -> [f64; 2] {
-    page.middle_of("map");
-    let place = page.value(&format!(
-        "(() => {{ const r = byId('map').getBoundingClientRect(), [u, v] = onMap({x}, {y}, r.width, map.half_m);
-         return [r.x + u, r.y + v]; }})()"
-    ));
-    let place = [0, 1].map(|i| place[i].as_f64().unwrap());
-    page.click(place);
-    let set = page.value("target()");
-    [0, 1].map(|i| set[i].as_f64().unwrap())
+/// Clicks on the map where a target means (x, y) m, as often as a person would whose click went
+/// beside it because the page moved; the numbers say where it was.
+fn click_target(page: &mut Chromium, [x, y]: [f64; 2]) {
+    for _ in 0..3 {
+        page.middle_of("map");
+        let place = page.value(&format!(
+            "(() => {{ const r = byId('map').getBoundingClientRect(), [u, v] = onMap({x}, {y}, r.width, map.half_m);
+             return [r.x + u, r.y + v]; }})()"
+        ));
+        let place = [0, 1].map(|i| place[i].as_f64().unwrap());
+        page.click(place);
+        let set = page.value("target()");
+        let off_m = [(0, x), (1, y)].map(|(i, asked)| (set[i].as_f64().unwrap() - asked).abs());
+        if off_m.iter().all(|off| *off < 0.02) {
+            return;
+        }
+        eprintln!("clicked at {place:?} for ({x}, {y}) m, which set {set}");
+    }
+    panic!("a click on the map does not set the target ({x}, {y}) m");
 }
 
 /// Answers what the run asks and holds the control while the arm waits for it, as a person does,
@@ -177,8 +187,7 @@ fn from_a_click_on_the_map_to_the_result() {
     // Out of reach, said before anything begins; then within.
     click_target(&mut page, [1.7, 0.0]);
     page.until("the objection", "studio.objection !== null");
-    let set = click_target(&mut page, [0.95, 0.1]);
-    assert!((set[0] - 0.95).abs() < 0.02 && (set[1] - 0.1).abs() < 0.02);
+    click_target(&mut page, [0.95, 0.1]);
     page.until("no objection", "studio.objection === null");
     click_in_view(&mut page);
     click_target(&mut page, [0.95, 0.1]);
