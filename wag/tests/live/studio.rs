@@ -36,25 +36,27 @@ fn open(page: &mut Chromium, url: &str) {
     page.until("the camera's picture", "watched.pictures > 0");
 }
 
-/// Clicks on the map where a target means (x, y) m, as often as a person would whose click went
-/// beside it because the page moved; the numbers say where it was.
+/// Clicks on the map where a target means (x, y) m, once more where the page moved it meanwhile;
+/// the numbers say where it was.
 fn click_target(page: &mut Chromium, [x, y]: [f64; 2]) {
+    let on_map = format!(
+        "(() => {{ const r = byId('map').getBoundingClientRect(), [u, v] = onMap({x}, {y}, r.width, map.half_m);
+         return [r.x + u, r.y + v]; }})()"
+    );
+    let mut moved = true;
     for _ in 0..3 {
         page.middle_of("map");
-        let place = page.value(&format!(
-            "(() => {{ const r = byId('map').getBoundingClientRect(), [u, v] = onMap({x}, {y}, r.width, map.half_m);
-             return [r.x + u, r.y + v]; }})()"
-        ));
-        let place = [0, 1].map(|i| place[i].as_f64().unwrap());
-        page.click(place);
-        let set = page.value("target()");
-        let off_m = [(0, x), (1, y)].map(|(i, asked)| (set[i].as_f64().unwrap() - asked).abs());
-        if off_m.iter().all(|off| *off < 0.02) {
-            return;
+        let place = page.value(&on_map);
+        page.click([0, 1].map(|i| place[i].as_f64().unwrap()));
+        moved = page.value(&on_map) != place;
+        if !moved {
+            break;
         }
-        eprintln!("clicked at {place:?} for ({x}, {y}) m, which set {set}");
     }
-    panic!("a click on the map does not set the target ({x}, {y}) m");
+    assert!(!moved, "the map is never at rest");
+    let set = page.value("target()");
+    let off_m = [(0, x), (1, y)].map(|(i, asked)| (set[i].as_f64().unwrap() - asked).abs());
+    assert!(off_m.iter().all(|off| *off < 0.02), "({x}, {y}) m: {set}");
 }
 
 /// Answers what the run asks and holds the control while the arm waits for it, as a person does,
