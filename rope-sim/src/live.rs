@@ -129,7 +129,8 @@ impl LiveRope {
     }
 
     /// Advances to `to_t_s` in equal steps, reading the attach frame's motion at the
-    /// end of each. Times that are not later than the one reached do nothing.
+    /// end of each: accelerations at these times must add up to the velocity, which those of a
+    /// staircase of setpoints do not. Times that are not later than the one reached do nothing.
     pub fn advance(&mut self, motion: &dyn Fn(f64) -> FrameMotion, to_t_s: f64) {
         if !(to_t_s > self.time_s && to_t_s.is_finite()) {
             return;

@@ -1,7 +1,8 @@
 //! How the clamp moved in a film.
 
 use crate::files::{self, JointsCsv};
-use anyhow::{Context, Result, ensure};
+use crate::mcap_file::GAP_NS;
+use anyhow::{Context, Result, bail, ensure};
 use arm_model::Pole;
 use rope_sim::{AttachMotion, MeasuredArm, PoseTrack};
 use std::path::{Path, PathBuf};
@@ -42,7 +43,7 @@ impl ClampMotion {
     }
 
     /// Refuses a motion that tells of a part of the film only; before and after it the clamp
-    /// would be taken to stand still.
+    /// would be taken to stand still, and in a gap its motion would be guessed.
     ///
     /// # Errors
     /// That, or a file of poses that cannot be read.
@@ -61,7 +62,18 @@ impl ClampMotion {
             "`{}` tells the clamp's motion from {first_s:.2} to {last_s:.2} s, but the film lasts from 0 to {film_s:.2} s: record the motion for all of the film, or give its time with --film-late-ms",
             self.path.display()
         );
-        Ok(())
+        let late_s = self.late_s;
+        let is_long = |[from_s, to_s]: &[f64; 2]| {
+            to_s - from_s > GAP_NS as f64 * 1e-9 && *to_s > 0.0 && *from_s < film_s
+        };
+        let mut pairs = times_s.windows(2).map(|t| [t[0] + late_s, t[1] + late_s]);
+        let gap = pairs.find(is_long);
+        gap.map_or(Ok(()), |[from_s, to_s]| {
+            bail!(
+                "`{}` has no motion of the clamp from {from_s:.2} to {to_s:.2} s: record the motion without a gap",
+                self.path.display()
+            )
+        })
     }
 
     /// For tracker and simulator.
@@ -86,6 +98,23 @@ impl ClampMotion {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use arm_model::JointVector;
+
+    #[test]
+    fn a_gap_in_the_motion_is_refused_where_the_film_shows_it() {
+        let pose = |t_s: &f64| JointVector([0.0, -0.1, 0.0, 1.0, 0.0, 1.0, *t_s * 1e-3]);
+        let check = |late_s: f64| {
+            let steps = (0..=100).filter(|i| !(51..=70).contains(i));
+            let times_s: Vec<f64> = steps.map(|i| 0.02 * f64::from(i)).collect();
+            let q = times_s.iter().map(pose).collect();
+            let joints = JointsCsv { times_s, q };
+            let path = Path::new("joints.csv");
+            ClampMotion::new(path, Some(joints), Pole::default(), late_s).check_covers(0.9)
+        };
+        let refusal = check(-0.5).unwrap_err().to_string();
+        assert!(refusal.contains("from 0.50 to 0.92 s"), "{refusal}");
+        assert!(check(0.0).is_ok());
+    }
 
     /// Poses from one time to another.
     fn poses(folder: &Path, from_s: f64, to_s: f64) -> ClampMotion {

@@ -7,10 +7,15 @@ use anyhow::{Context, Result, bail, ensure};
 use arm_model::Cell;
 use nalgebra::Vector3;
 use rt_controller::recording::{Item, LogReader, Read};
-use serde_json::Value;
+use serde_json::{Value, json};
 use shared_types::ipc::message::ScoreResult;
 use shared_types::{Plan, RopeParams, Task};
 use std::path::{Path, PathBuf};
+
+/// Keys of `summary.json` after another measurement of the throw: the score that the run made
+/// itself, and the colours by which the present one was made.
+const SCORE_OF_RUN: &str = "score_of_run";
+const SCORED_BY: &str = "scored_by";
 
 /// Colours of tip and target, as far as they are known.
 pub type Colours = [Option<[u8; 3]>; 2];
@@ -60,6 +65,12 @@ fn require_same_target(file: &Path, seen_m: [f64; 3], planned_m: [f64; 3]) -> Re
     Ok(())
 }
 
+/// The folder of a file, which may be the current one.
+fn parent_of(file: &Path) -> PathBuf {
+    let parent = file.parent().filter(|p| !p.as_os_str().is_empty());
+    parent.unwrap_or(Path::new(".")).to_owned()
+}
+
 /// A folder or a file without a recording.
 #[derive(Debug, thiserror::Error)]
 #[error(
@@ -96,7 +107,7 @@ impl Run {
             });
         }
         Ok(Self {
-            folder: run.parent().unwrap_or(Path::new("")).to_owned(),
+            folder: parent_of(run),
             recorded: Some(run.to_owned()),
             film: run.to_owned(),
         })
@@ -157,15 +168,10 @@ impl Run {
     /// It has none, or no plan of a throw, or ended before its throw did.
     pub fn summary_of_throw(&self) -> Result<Value> {
         let name = self.folder.display();
-        let has_plan = self.plan()?.is_some();
-        let summary = self.summary()?.filter(|s| s.is_object() && has_plan);
-        let summary = summary.with_context(|| {
-            format!(
-                "`{name}` is not the folder of a throw: it lacks {} or {}",
-                files::SUMMARY,
-                files::PLAN
-            )
-        })?;
+        let not_a_throw = |file| format!("`{name}` is not the folder of a throw: it lacks {file}");
+        self.plan()?.with_context(|| not_a_throw(files::PLAN))?;
+        let summary = self.summary()?.filter(Value::is_object);
+        let summary = summary.with_context(|| not_a_throw(files::SUMMARY))?;
         ensure!(
             summary["ok"] != false,
             "`{name}` ended with an error ({}): name another run, or its plan.json and the miss \
@@ -195,12 +201,13 @@ impl Run {
         Ok(summary)
     }
 
-    /// Colours of tip and target by which its throw was, or was to be, measured.
+    /// Colours of tip and target by which its throw was last, or was to be, measured.
     pub fn colours(&self) -> Result<Colours> {
         let summary = self.summary()?.unwrap_or_default();
         let colour = |value: &Value| serde_json::from_value(value.clone()).ok();
-        let tip_rgb = colour(&summary["tip_rgb"]).or_else(|| colour(&summary["track"]["lead_rgb"]));
-        Ok([tip_rgb, colour(&summary["target_rgb"])])
+        let last = |key| colour(&summary[SCORED_BY][key]).or_else(|| colour(&summary[key]));
+        let tip_rgb = last("tip_rgb").or_else(|| colour(&summary["track"]["lead_rgb"]));
+        Ok([tip_rgb, last("target_rgb")])
     }
 
     /// The film of its throw, both images, which it has where it was to keep its films.
@@ -210,9 +217,7 @@ impl Run {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             name.starts_with(&prefix) && name.ends_with(".yuyv")
         };
-        // A run that is named by its file may lie in the current folder, whose name is empty.
-        let folder = self.folder.join(".");
-        let listed = std::fs::read_dir(&folder).map_err(cannot_read(&folder))?;
+        let listed = std::fs::read_dir(&self.folder).map_err(cannot_read(&self.folder))?;
         let paths = listed.filter_map(|entry| Some(entry.ok()?.path()));
         paths.filter(is_film).min().with_context(|| {
             format!(
@@ -222,17 +227,29 @@ impl Run {
         })
     }
 
-    /// Keeps what a camera measured of its throw among its figures, in place of what is there.
+    /// Keeps what a camera measured of its throw among its figures, and the colours by which it
+    /// did. What the run itself measured stays beside it. Returns the distance that is replaced
+    /// (m), if there was one.
     ///
     /// # Errors
     /// As [`Self::summary_of_strike`]; the film shows another target than the plan's.
-    pub fn keep_score(&self, score: &ScoreResult) -> Result<()> {
+    pub fn keep_score(
+        &self,
+        score: &ScoreResult,
+        [tip_rgb, target_rgb]: [[u8; 3]; 2],
+    ) -> Result<Option<f64>> {
         let mut summary = self.summary_of_strike()?;
         let file = self.folder.join(files::SUMMARY);
         if let Some(plan) = self.plan()? {
             require_same_target(&file, score.target_m, plan.target_m)?;
         }
+        let before = summary["score"].take();
+        let before_m = before["closest_m"].as_f64();
+        if before_m.is_some() && summary[SCORE_OF_RUN].is_null() {
+            summary[SCORE_OF_RUN] = before;
+        }
         summary["score"] = serde_json::to_value(score)?;
+        summary[SCORED_BY] = json!({ "tip_rgb": tip_rgb, "target_rgb": target_rgb });
         if let Some(figures) = summary.as_object_mut() {
             figures.remove("score_failed");
             // A demo tells it a second time.
@@ -240,7 +257,8 @@ impl Run {
                 .entry("stereo_tip_target_distance_m")
                 .and_modify(|m| *m = score.closest_m.into());
         }
-        files::write_json(&file, &summary)
+        files::write_json(&file, &summary)?;
+        Ok(before_m)
     }
 
     /// Where the tip passed minus the target (m, base frame), as the run's camera measured it.

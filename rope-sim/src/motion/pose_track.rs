@@ -18,7 +18,7 @@ pub struct PoseRow {
 /// Attach frame through sampled poses: cubic interpolating splines through position
 /// and quaternion components, so accelerations are continuous and are those of the
 /// interpolated pose. Meant for dense (about 1 kHz), nearly noise-free poses: it
-/// goes through every sample.
+/// goes through every sample, so a staircase of setpoints in them becomes acceleration.
 #[derive(Debug, Clone)]
 pub struct PoseTrack {
     t_s: Vec<f64>,

@@ -25,7 +25,7 @@ pub(super) const CAMERA: [&str; 2] = ["camera", "json"];
 /// Joints are taken from so much before the first picture to so much after the last (ns).
 const MARGIN_NS: u64 = 500_000_000;
 /// A longer time without a record means that some are missing (ns).
-const GAP_NS: u64 = 250_000_000;
+pub(crate) const GAP_NS: u64 = 250_000_000;
 /// Fewest joint reports that tell a motion.
 const MIN_JOINTS: usize = 8;
 /// Most pictures that are taken into memory (bytes): an hour of them.

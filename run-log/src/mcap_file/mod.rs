@@ -23,6 +23,7 @@ mod writer;
 
 pub use channel::Channel;
 pub use counts::RecordingCounts;
+pub(crate) use film::GAP_NS;
 pub use film::{RunFilm, RunPart};
 pub use image::left_jpeg;
 pub(crate) use read::{is_mcap, replay_bytes};

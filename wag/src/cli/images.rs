@@ -107,21 +107,21 @@ pub struct StereoArgs {
 #[derive(Debug, Args)]
 pub struct ScoreArgs {
     /// The film, as `wag track` takes it. Default: that of the throw, of a run with --keep-films.
-    #[arg(long, required_unless_present = "run")]
+    #[arg(long)]
     pub video: Option<PathBuf>,
     /// Frames per second, for a recording that does not tell its frames' times.
     #[arg(long, value_parser = rate_hz, requires = "video")]
     pub fps: Option<f64>,
-    /// Camera calibration and extrinsics. Default: the run's.
-    #[arg(long, required_unless_present = "run")]
+    /// Camera calibration and extrinsics; may be left out with --run.
+    #[arg(long)]
     pub camera: Option<PathBuf>,
-    /// Colour of the tip, R,G,B from 0 to 255. Default: the run's.
-    #[arg(long, required_unless_present = "run")]
+    /// Colour of the tip, R,G,B from 0 to 255; may be left out with --run.
+    #[arg(long)]
     pub tip_rgb: Option<Colour>,
-    /// Colour of the target, R,G,B from 0 to 255. Default: the run's.
-    #[arg(long, required_unless_present = "run")]
+    /// Colour of the target, R,G,B from 0 to 255; may be left out with --run.
+    #[arg(long)]
     pub target_rgb: Option<Colour>,
-    /// Folder of the throw's run: it keeps the miss, for `--again`.
+    /// Folder of the throw's run, which tells camera and colours and keeps the miss, for `--again`.
     #[arg(long, value_name = "RUN")]
     pub run: Option<PathBuf>,
 }

@@ -1,6 +1,5 @@
 //! `wag score`: closest approach of tip and target from stereo video.
 
-use super::run::UNNAMED_COLOURS;
 use crate::cli::ScoreArgs;
 use anyhow::Context;
 use camera_ingest::{ScoreError, load_camera, open_video, score};
@@ -37,9 +36,11 @@ pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     let of_run = run.as_ref().map(Run::colours).transpose().or_input()?;
     let named = [args.tip_rgb, args.target_rgb].map(|colour| colour.map(|named| named.0));
     let [tip_rgb, target_rgb] = [0, 1].map(|i| named[i].or(of_run.and_then(|of| of[i])));
-    let known = tip_rgb.zip(target_rgb).context(UNNAMED_COLOURS);
-    let (tip_rgb, target_rgb) = known.or_input()?;
     let (video, camera) = filmed(args, run.as_ref()).or_input()?;
+    let known = tip_rgb
+        .zip(target_rgb)
+        .context("name the colours with --tip-rgb and --target-rgb");
+    let (tip_rgb, target_rgb) = known.or_input()?;
     let camera = load_camera(&camera).or_input()?;
     let mut frames = open_video(&video, args.fps).or_input()?;
     let stage = Stage::begin("score");
@@ -56,9 +57,14 @@ pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     stage.done("tip and target measured");
     println!("{line}");
     let score = ScoreResult::from(&found);
-    let kept = run.map(|run| run.keep_score(&score));
-    kept.transpose().or_input()?;
     let mut value = serde_json::to_value(score).or_failed()?;
+    if let Some(run) = &run {
+        let before_m = run.keep_score(&score, [tip_rgb, target_rgb]).or_input()?;
+        let instead = before_m.map(|m| format!(" in place of {:.1} mm", 1e3 * m));
+        let (instead, folder) = (instead.unwrap_or_default(), run.folder().display());
+        println!("kept in `{folder}`{instead}; `wag report {folder}` makes its report anew");
+        value["replaced_m"] = before_m.into();
+    }
     value["ok"] = true.into();
     value["command"] = "score".into();
     value["run"] = json!(args.run);

@@ -162,11 +162,18 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
         target_m: [0.0; 3],
         ..scored
     };
-    let refused = run.keep_score(&elsewhere).unwrap_err().to_string();
+    let colours = [[250, 120, 30], [40, 90, 200]];
+    let refused = run.keep_score(&elsewhere, colours).unwrap_err().to_string();
     assert!(refused.contains("another throw"), "{refused}");
-    run.keep_score(&scored).unwrap();
+    let before_m = run.keep_score(&scored, colours).unwrap();
+    assert!(before_m.is_some_and(|m| m < 0.015), "{before_m:?}");
     let summary = run.summary().unwrap().unwrap();
     assert_eq!(summary["seed"], 1, "the rest stays");
+    assert_eq!(run.colours().unwrap(), colours.map(Some));
+    let again_m = run.keep_score(&scored, colours).unwrap();
+    assert_eq!(again_m, Some(scored.closest_m));
+    let summary_now = run.summary().unwrap().unwrap();
+    assert_eq!(summary_now["score_of_run"]["closest_m"].as_f64(), before_m);
     assert_eq!(summary["stereo_tip_target_distance_m"], scored.closest_m);
     let third = json_in(folder.path(), "plan again second --out third.json");
     assert_eq!(third["miss_m"], serde_json::json!(scored.miss_m), "{third}");

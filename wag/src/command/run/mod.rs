@@ -8,7 +8,7 @@ mod stages;
 mod summary;
 
 pub use inputs::check_target;
-pub use stages::{Entry, Run, Setup, UNNAMED_COLOURS};
+pub use stages::{Entry, Run, Setup};
 
 use super::area::{asks, limits, operator, reach_measured, require_clear_area, response_for_plans};
 use super::on_arm::{confirmations, watch_operator};
