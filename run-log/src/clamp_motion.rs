@@ -70,7 +70,7 @@ impl ClampMotion {
         let gap = pairs.find(is_long);
         gap.map_or(Ok(()), |[from_s, to_s]| {
             bail!(
-                "`{}` has no motion of the clamp from {from_s:.2} to {to_s:.2} s: record the motion without a gap",
+                "`{}` has no motion of the clamp from {from_s:.2} to {to_s:.2} s: record it without a gap of more than 0.25 s",
                 self.path.display()
             )
         })

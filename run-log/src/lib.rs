@@ -36,6 +36,7 @@ mod mcap_file;
 mod page;
 mod run;
 mod run_record;
+mod run_score;
 mod tracked_film;
 mod unconfirmed;
 
@@ -50,7 +51,8 @@ pub use mcap_file::{
     RunFileThread, RunFilm, RunPart, SimulateRope, left_jpeg, record, recover,
 };
 pub use page::show;
-pub use run::{CellHere, Colours, NoRecording, Recording, Run};
+pub use run::{CellHere, NoRecording, Recording, Run};
 pub use run_record::{Film, MotionSpan, RunRecord, Settled, StageTimes, Tracked};
+pub use run_score::{Colours, Kept, ScoredBy};
 pub use tracked_film::TrackedFilm;
 pub use unconfirmed::confirm;

@@ -5,20 +5,10 @@ use crate::mcap_file::{RunFilm, is_mcap, replay_bytes};
 use crate::{CommandLine, Cycles, Explanation, RunLog, explain, files};
 use anyhow::{Context, Result, bail, ensure};
 use arm_model::Cell;
-use nalgebra::Vector3;
 use rt_controller::recording::{Item, LogReader, Read};
-use serde_json::{Value, json};
-use shared_types::ipc::message::ScoreResult;
-use shared_types::{Plan, RopeParams, Task};
+use serde_json::Value;
+use shared_types::{Plan, RopeParams};
 use std::path::{Path, PathBuf};
-
-/// Keys of `summary.json` after another measurement of the throw: the score that the run made
-/// itself, and the colours by which the present one was made.
-const SCORE_OF_RUN: &str = "score_of_run";
-const SCORED_BY: &str = "scored_by";
-
-/// Colours of tip and target, as far as they are known.
-pub type Colours = [Option<[u8; 3]>; 2];
 
 /// A run. What a folder does not hold is `None`; what it holds and is damaged is an error
 /// that names the file.
@@ -44,25 +34,6 @@ impl CellHere {
     pub fn of_run(&self, reported: Option<Cell>) -> Cell {
         reported.filter(|_| !self.is_named).unwrap_or(self.cell)
     }
-}
-
-/// Refuses a score whose target is not that of the throw: it is of another film, or of a camera
-/// that stands elsewhere than it is calibrated for.
-fn require_same_target(file: &Path, seen_m: [f64; 3], planned_m: [f64; 3]) -> Result<()> {
-    /// Farthest that a target may be seen from where it was planned (m).
-    const APART_MAX_M: f64 = 0.05;
-    let apart_m = (Vector3::from(seen_m) - Vector3::from(planned_m)).norm();
-    let at = |m: [f64; 3]| m.map(|m| format!("{m:.3}")).join(", ");
-    ensure!(
-        apart_m < APART_MAX_M,
-        "`{}`: the film shows a target at ({}) m, but the throw was planned for ({}) m, {:.1} cm \
-         away: it is the film of another throw, or the camera stands elsewhere",
-        file.display(),
-        at(seen_m),
-        at(planned_m),
-        100.0 * apart_m
-    );
-    Ok(())
 }
 
 /// The folder of a file, which may be the current one.
@@ -183,33 +154,6 @@ impl Run {
         Ok(summary)
     }
 
-    /// The figures of a run that threw a strike.
-    ///
-    /// # Errors
-    /// As [`Self::summary_of_throw`]; its throw was no strike.
-    pub fn summary_of_strike(&self) -> Result<Value> {
-        let summary = self.summary_of_throw()?;
-        let task = self.plan()?.map_or(Task::Strike, |plan| plan.task);
-        ensure!(
-            task == Task::Strike,
-            "`{}` is the run of a {}, whose verdict by camera is in its {}: the distance of tip and \
-             target is measured of strikes",
-            self.folder.display(),
-            task.name(),
-            files::SUMMARY
-        );
-        Ok(summary)
-    }
-
-    /// Colours of tip and target by which its throw was last, or was to be, measured.
-    pub fn colours(&self) -> Result<Colours> {
-        let summary = self.summary()?.unwrap_or_default();
-        let colour = |value: &Value| serde_json::from_value(value.clone()).ok();
-        let last = |key| colour(&summary[SCORED_BY][key]).or_else(|| colour(&summary[key]));
-        let tip_rgb = last("tip_rgb").or_else(|| colour(&summary["track"]["lead_rgb"]));
-        Ok([tip_rgb, last("target_rgb")])
-    }
-
     /// The film of its throw, both images, which it has where it was to keep its films.
     pub fn throw_film(&self) -> Result<PathBuf> {
         let prefix = format!("{}_", files::THROW_FILM);
@@ -225,66 +169,6 @@ impl Run {
                 self.folder.display()
             )
         })
-    }
-
-    /// Keeps what a camera measured of its throw among its figures, and the colours by which it
-    /// did. What the run itself measured stays beside it. Returns the distance that is replaced
-    /// (m), if there was one.
-    ///
-    /// # Errors
-    /// As [`Self::summary_of_strike`]; the film shows another target than the plan's.
-    pub fn keep_score(
-        &self,
-        score: &ScoreResult,
-        [tip_rgb, target_rgb]: [[u8; 3]; 2],
-    ) -> Result<Option<f64>> {
-        let mut summary = self.summary_of_strike()?;
-        let file = self.folder.join(files::SUMMARY);
-        if let Some(plan) = self.plan()? {
-            require_same_target(&file, score.target_m, plan.target_m)?;
-        }
-        let before = summary["score"].take();
-        let before_m = before["closest_m"].as_f64();
-        if before_m.is_some() && summary[SCORE_OF_RUN].is_null() {
-            summary[SCORE_OF_RUN] = before;
-        }
-        summary["score"] = serde_json::to_value(score)?;
-        summary[SCORED_BY] = json!({ "tip_rgb": tip_rgb, "target_rgb": target_rgb });
-        if let Some(figures) = summary.as_object_mut() {
-            figures.remove("score_failed");
-            // A demo tells it a second time.
-            figures
-                .entry("stereo_tip_target_distance_m")
-                .and_modify(|m| *m = score.closest_m.into());
-        }
-        files::write_json(&file, &summary)?;
-        Ok(before_m)
-    }
-
-    /// Where the tip passed minus the target (m, base frame), as the run's camera measured it.
-    /// One that it hardly knows is refused.
-    pub fn miss_m(&self) -> Result<[f64; 3]> {
-        /// Widest interval of a distance whose miss is believed (m).
-        const INTERVAL_MAX_M: f64 = 0.1;
-        let score = self.summary()?.unwrap_or_default()["score"].take();
-        let path = self.folder.join(files::SUMMARY);
-        let name = path.display();
-        let miss_m = serde_json::from_value(score["miss_m"].clone()).ok();
-        let miss_m = miss_m.with_context(|| {
-            format!("`{name}` has no miss by the camera (`score.miss_m`): name it with --miss, or measure it with `wag score --run`")
-        })?;
-        let [low_m, high_m]: [f64; 2] = serde_json::from_value(score["interval_m"].clone())
-            .with_context(|| format!("`{name}`: `score.interval_m`"))?;
-        ensure!(
-            high_m - low_m < INTERVAL_MAX_M,
-            "`{name}`: the camera knows the distance from {low_m:.3} to {high_m:.3} m only \
-             (`score.interval_m`); look at the film and name the miss with --miss"
-        );
-        let target_m = serde_json::from_value(score["target_m"].clone()).ok();
-        if let Some((target_m, plan)) = target_m.zip(self.plan()?) {
-            require_same_target(&path, target_m, plan.target_m)?;
-        }
-        Ok(miss_m)
     }
 
     /// The cell it ran in; runs of older versions do not tell it.

@@ -4,7 +4,7 @@ use crate::cli::ScoreArgs;
 use anyhow::Context;
 use camera_ingest::{ScoreError, load_camera, open_video, score};
 use cli_output::{Failure, OrInput, Outcome, Stage};
-use run_log::{Run, files};
+use run_log::{Run, ScoredBy, files};
 use serde_json::{Value, json};
 use shared_types::ipc::message::ScoreResult;
 use std::path::{Path, PathBuf};
@@ -41,10 +41,10 @@ pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
         .zip(target_rgb)
         .context("name the colours with --tip-rgb and --target-rgb");
     let (tip_rgb, target_rgb) = known.or_input()?;
-    let camera = load_camera(&camera).or_input()?;
+    let sees = load_camera(&camera).or_input()?;
     let mut frames = open_video(&video, args.fps).or_input()?;
     let stage = Stage::begin("score");
-    let found = score(&mut frames, &camera, tip_rgb, target_rgb)
+    let found = score(&mut frames, &sees, tip_rgb, target_rgb)
         .map_err(|error| not_scored(error, &video))?;
     let [x, y, z] = found.miss_m;
     let line = format!(
@@ -59,11 +59,18 @@ pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     let score = ScoreResult::from(&found);
     let mut value = serde_json::to_value(score).or_failed()?;
     if let Some(run) = &run {
-        let before_m = run.keep_score(&score, [tip_rgb, target_rgb]).or_input()?;
-        let instead = before_m.map(|m| format!(" in place of {:.1} mm", 1e3 * m));
-        let (instead, folder) = (instead.unwrap_or_default(), run.folder().display());
-        println!("kept in `{folder}`{instead}; `wag report {folder}` makes its report anew");
-        value["replaced_m"] = before_m.into();
+        let by = ScoredBy {
+            video,
+            camera,
+            tip_rgb,
+            target_rgb,
+        };
+        let kept = run.keep_score(&score, &by).or_input()?;
+        println!("{kept}");
+        for warning in &kept.warnings {
+            eprintln!("warning: {warning}");
+        }
+        value["replaced_m"] = json!(kept.replaced.map(|r| r.closest_m));
     }
     value["ok"] = true.into();
     value["command"] = "score".into();

@@ -5,7 +5,7 @@ use crate::support::{alone, command, json_in, process_of, processes_of, said, se
 use arm_model::Limits;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use run_log::Run;
+use run_log::{Run, ScoredBy};
 use rustix::process::Signal;
 use shared_types::ipc::message::ScoreResult;
 use std::path::Path;
@@ -149,33 +149,59 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
     let distance_m = second["true_tip_target_distance_m"].as_f64().unwrap();
     assert!(distance_m < 0.015, "{second:#}");
     assert!(second["epoch_ns"].as_u64().unwrap() > 0);
-    // What a camera beside it measured takes the place of what its own did.
+    let run = Run::open(&folder.path().join("second")).unwrap();
+    let scored = score_again(&run, corrected.target_m);
+    let third = json_in(folder.path(), "plan again second --out third.json");
+    assert_eq!(third["miss_m"], serde_json::json!(scored.miss_m), "{third}");
+    assert_eq!(third["aim"]["corrections"], 2, "{third}");
+}
+
+/// What a camera beside a run measured takes the place of what its own did. Returns that.
+fn score_again(run: &Run, target_m: [f64; 3]) -> ScoreResult {
     let scored = ScoreResult {
         closest_m: 0.03,
-        interval_m: [0.02, 0.04],
+        interval_m: [0.0, 0.04],
         miss_m: [0.01, -0.02, 0.02],
         time_s: 0.9,
-        target_m: corrected.target_m,
+        target_m,
     };
-    let run = Run::open(&folder.path().join("second")).unwrap();
     let elsewhere = ScoreResult {
         target_m: [0.0; 3],
         ..scored
     };
-    let colours = [[250, 120, 30], [40, 90, 200]];
-    let refused = run.keep_score(&elsewhere, colours).unwrap_err().to_string();
+    let own = run.colours().unwrap();
+    let by = ScoredBy {
+        video: "film.yuyv".into(),
+        camera: "camera.toml".into(),
+        tip_rgb: [250, 120, 30],
+        target_rgb: [40, 90, 200],
+    };
+    let refused = run.keep_score(&elsewhere, &by).unwrap_err().to_string();
     assert!(refused.contains("another throw"), "{refused}");
-    let before_m = run.keep_score(&scored, colours).unwrap();
-    assert!(before_m.is_some_and(|m| m < 0.015), "{before_m:?}");
+    let kept = run.keep_score(&scored, &by).unwrap();
+    let own_score = kept.replaced.unwrap();
+    assert!(own_score.closest_m < 0.015, "{own_score:?}");
+    assert_eq!(kept.warnings, Vec::<String>::new());
     let summary = run.summary().unwrap().unwrap();
     assert_eq!(summary["seed"], 1, "the rest stays");
-    assert_eq!(run.colours().unwrap(), colours.map(Some));
-    let again_m = run.keep_score(&scored, colours).unwrap();
-    assert_eq!(again_m, Some(scored.closest_m));
-    let summary_now = run.summary().unwrap().unwrap();
-    assert_eq!(summary_now["score_of_run"]["closest_m"].as_f64(), before_m);
+    // One that contradicts it, by another colour say, is kept with a warning.
+    let far_off = ScoreResult {
+        closest_m: 0.12,
+        interval_m: [0.1, 0.15],
+        ..scored
+    };
+    let again = run.keep_score(&far_off, &by).unwrap();
+    assert_eq!(again.replaced, Some(scored));
+    assert!(again.warnings[0].contains("contradicts"), "{again:?}");
+    assert!(run.keep_score(&scored, &by).is_ok());
+    let kept = run.summary().unwrap().unwrap();
+    assert_eq!(kept["score_of_run"], serde_json::json!(own_score));
+    assert_eq!(kept["scored_by"], serde_json::json!(by));
+    assert_eq!(
+        run.colours().unwrap(),
+        own,
+        "the next score takes the run's"
+    );
     assert_eq!(summary["stereo_tip_target_distance_m"], scored.closest_m);
-    let third = json_in(folder.path(), "plan again second --out third.json");
-    assert_eq!(third["miss_m"], serde_json::json!(scored.miss_m), "{third}");
-    assert_eq!(third["aim"]["corrections"], 2, "{third}");
+    scored
 }
