@@ -203,7 +203,7 @@ mod tests {
         let mut exact = LiveRope::new(
             &rope,
             &cell.pole.attach_motion(&JointState::at_rest(START_POSE)),
-            0.1 * STEP_S,
+            STEP_S,
         )
         .unwrap();
         let mut moved_m: f64 = 0.0;

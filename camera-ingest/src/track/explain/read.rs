@@ -6,7 +6,7 @@ use super::disc::Disc;
 use super::end::{self, End};
 use super::ends::{END_REACH, EndPicture, Window, start_px};
 use super::evidence::Lit;
-use super::field::{Offset, ProfileSearch, moved, offsets, smooth_field, smoothed};
+use super::field::{Offset, ProfileSearch, Smoothing, moved, offsets, smooth_field, smoothed};
 use super::reading::Reading;
 use super::round::{self, Profile, Round};
 use super::statistics::median;
@@ -19,11 +19,17 @@ const FIRST_REACH: usize = 14;
 const SECOND_REACH: usize = 9;
 /// Half the width assumed before it is known (px).
 const UNKNOWN_HALF_PX: f64 = 3.0;
-/// Stiffness of the offsets over time and along the rope, at the first and second look. At 60
-/// frames a second the second look lets a stiff rope's bending of 12 Hz pass: a tenth of a pixel
-/// of it missing from the keypoints makes the rope look like another one.
-const FIRST_STIFFNESS: [f64; 2] = [2.0, 1.0];
-pub(super) const SECOND_STIFFNESS: [f64; 2] = [0.02, 0.5];
+/// How offsets are smoothed at the first and second look.
+const FIRST: Smoothing = Smoothing {
+    over_time: 2.0,
+    along: 1.0,
+    quick_px: 0.0,
+};
+pub(super) const SECOND: Smoothing = Smoothing {
+    over_time: 0.5,
+    along: 0.5,
+    quick_px: 0.75,
+};
 /// Weight of what is seen where the tip weight hides the rope.
 const HIDDEN: f64 = 0.02;
 /// Around the free end, and the tip weight found there.
@@ -61,7 +67,7 @@ const SEEN_PART: f64 = 0.25;
 /// place is found better, a pixel half covered passes for a whole one.
 const SIZED_SHADES: [f32; 3] = [0.85, 1.0, 1.15];
 /// Stiffness of its offsets over time, and their pull to the curve's end.
-const TIP_STIFFNESS: f64 = 0.3;
+const TIP_STIFFNESS: f64 = 0.05;
 const TIP_PULL: f64 = 0.02;
 
 /// A film's frames, and the hypothesis's curves in them.
@@ -100,7 +106,7 @@ impl<'a> Reader<'a> {
         };
         let hypothesis = self.curves.clone();
         let field = self.look(look, |lit, p| lit.unexplained(p).map_or(0.0, |(e, _)| e));
-        self.follow(field.clone(), FIRST_STIFFNESS, None);
+        self.follow(field.clone(), FIRST, None);
         let rope = groups(&self.rope_samples(), ROPE_COLOURS);
         let frames = self.learnt();
         let evident = frames.map(|(lit, curve)| (curve.to_vec(), |p| Some(lit.unexplained(p)?.0)));
@@ -108,7 +114,7 @@ impl<'a> Reader<'a> {
         let mut end = end::find(&picture, picture.rope_half_px(), END_REACH_PX, 0.0);
         // A weight thicker than the look is wide draws it to one of its sides.
         self.curves = hypothesis;
-        self.follow(field, FIRST_STIFFNESS, Some(&end));
+        self.follow(field, FIRST, Some(&end));
         // The arm says where the clamp is, but for the camera's place; the picture shows where
         // the rope comes out of it, but for caps and knots, and counts less.
         let coloured = self.learnt().map(|(lit, curve)| {
@@ -132,7 +138,7 @@ impl<'a> Reader<'a> {
             .iter()
             .map(|f| f.iter().map(|o| o.weight).collect())
             .collect();
-        self.follow(field, SECOND_STIFFNESS, Some(&end));
+        self.follow(field, SECOND, Some(&end));
         let still = self.still_frames();
         let round = self.round(&still);
         if round.left < CYLINDER {
@@ -184,12 +190,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Moves all curves to what was seen, but for what the tip weight hides.
-    fn follow(
-        &mut self,
-        mut field: Vec<Vec<Offset>>,
-        [over_time, along]: [f64; 2],
-        end: Option<&End>,
-    ) {
+    fn follow(&mut self, mut field: Vec<Vec<Offset>>, mut smoothing: Smoothing, end: Option<&End>) {
         if let Some(end) = end {
             for (offsets, curve) in field.iter_mut().zip(&self.curves) {
                 for offset in &mut offsets[end.nodes_shown(curve)..] {
@@ -199,7 +200,8 @@ impl<'a> Reader<'a> {
         }
         // Offsets in frames further apart in time have less to do with each other.
         let apart = (self.every as f64).powi(3);
-        smooth_field(&mut field, over_time / apart, along);
+        smoothing.over_time /= apart;
+        smooth_field(&mut field, smoothing);
         for (curve, offsets) in self.curves.iter_mut().zip(&field) {
             *curve = respaced(&moved(curve, offsets.iter().map(|o| o.px)), curve);
         }
