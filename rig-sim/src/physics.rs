@@ -3,7 +3,7 @@
 use super::contact::touches;
 use super::error::RigError;
 use super::record::{Bodies, Placed, Record, Snapshot};
-use arm_model::{Cell, JointPiece, JointState};
+use arm_model::{Cell, JointPiece, JointState, JointVector};
 use rope_sim::{LiveRope, Scene};
 use shared_types::{MonotonicNs, RopeParams};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -53,6 +53,8 @@ struct Physics {
     cell: Cell,
     start: MonotonicNs,
     last: JointSample,
+    /// Mean acceleration of the joints up to it (rad/s²).
+    mean_qdd: JointVector,
 }
 
 impl Physics {
@@ -64,6 +66,7 @@ impl Physics {
             cell: *cell,
             start: first.at,
             last: *first,
+            mean_qdd: JointVector::ZERO,
         })
     }
 
@@ -98,9 +101,13 @@ impl Physics {
         );
         // The arm's acceleration jumps with every setpoint, and the rope's integration reads it
         // at the ends of its steps: summing single values would give a velocity other than the
-        // arm's. The mean follows from the velocities at both ends.
-        let qdd = (next.state.qd - self.last.state.qd) * (1.0 / span_s);
-        let [from, to] = [self.last.state, next.state].map(|state| JointState { qdd, ..state });
+        // arm's. The mean follows from the velocities at both ends, its slope from the last one.
+        let mean = (next.state.qd - self.last.state.qd) * (1.0 / span_s);
+        let half_change = (mean - self.mean_qdd) * 0.5;
+        self.mean_qdd = mean;
+        let with = |state: JointState, qdd| JointState { qdd, ..state };
+        let from = with(self.last.state, mean - half_change);
+        let to = with(next.state, mean + half_change);
         let piece = JointPiece::quintic(&from, &to, span_s);
         let pole = self.cell.pole;
         let motion = |t_s: f64| pole.attach_motion(&piece.at(t_s - from_s));
