@@ -10,8 +10,9 @@ use serde_json::Value;
 use std::path::Path;
 use xarm_sim::{ArmConfig, JointLag, SimulatedArm};
 
-/// Joints that are moved (1-based); the others rest.
-const MOVED: [usize; 3] = [1, 4, 6];
+/// Joints (1-based) that neither the sweeps nor the move to their pose moves. That move may tell
+/// joint 2, depending on the machine: then it must be right, too.
+const STILL: [usize; 3] = [3, 5, 7];
 
 fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
     let text = std::fs::read_to_string(path).unwrap();
@@ -22,7 +23,7 @@ fn check(path: &Path, secrets: &[JointLag; JOINTS]) -> Vec<Errors> {
         .zip(&response.joints)
         .filter_map(|(joint, found)| {
             assert!(
-                found.lag().is_none() || MOVED.contains(&joint),
+                found.lag().is_none() || !STILL.contains(&joint),
                 "joint {joint}: {text}"
             );
             let error = Errors::of(found.lag()?, &secrets[joint - 1]);
