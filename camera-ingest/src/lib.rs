@@ -29,6 +29,6 @@ mod whole_file;
 
 pub use calib::{CalibError, load_camera};
 pub use frame::{ImageFrame, StereoFrame};
-pub use score::{Score, ScoreError, score};
+pub use score::{Score, ScoreError, look, score};
 pub use source::{FrameSource, SourceError, StereoSource, open_video};
 pub use track::{Film, RopeAppearance, TrackError, TrackResult, USUAL_KEYPOINTS, track};

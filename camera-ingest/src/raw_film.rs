@@ -9,10 +9,21 @@ use crate::whole_file::write_whole;
 
 /// A film that cannot be written.
 #[derive(Debug, thiserror::Error)]
-#[error("film {path}: {source} (is there room, and permission?)")]
+#[error("film {path}: {}", self.why())]
 pub struct FilmError {
     path: PathBuf,
     source: io::Error,
+}
+
+impl FilmError {
+    fn why(&self) -> String {
+        match self.source.kind() {
+            io::ErrorKind::AlreadyExists => {
+                "is there already, and a film is not replaced: name another".to_owned()
+            }
+            _ => format!("{} (is there room, and permission?)", self.source),
+        }
+    }
 }
 
 /// A film under way. Both files appear whole or not at all.
@@ -26,7 +37,8 @@ pub(crate) struct RawFilm {
 }
 
 impl RawFilm {
-    /// Begins `NAME_WIDTHxHEIGHT.yuyv`; the size is that of both images together.
+    /// Begins `NAME_WIDTHxHEIGHT.yuyv`; the size is that of both images together. One that is
+    /// there already is not replaced: what was filmed cannot be repeated.
     pub(crate) fn create(
         name: &Path,
         [width_px, height_px]: [usize; 2],
@@ -36,11 +48,17 @@ impl RawFilm {
             path.push(format!("_{width_px}x{height_px}.{ending}"));
             PathBuf::from(path)
         };
+        let (film, times) = (with("yuyv"), with("csv"));
+        for there in [&film, &times] {
+            if there.try_exists().unwrap_or(true) {
+                return Err(cannot(there)(io::ErrorKind::AlreadyExists.into()));
+            }
+        }
         let part = Unfinished(with("yuyv.part"));
         let file = File::create(&part.0).map_err(cannot(&part.0))?;
         Ok(Self {
-            film: with("yuyv"),
-            times: with("csv"),
+            film,
+            times,
             part,
             file: BufWriter::new(file),
             csv: "frame,sequence,monotonic_ns\n".to_owned(),

@@ -51,6 +51,8 @@ struct Throw {
     seed: u64,
     /// Of the domino, if not as the seed has it.
     domino_rgb: Option<[u8; 3]>,
+    /// Until when it is looked at (s).
+    until_s: f64,
 }
 
 impl Default for Throw {
@@ -63,6 +65,7 @@ impl Default for Throw {
             hides: None,
             seed: 1,
             domino_rgb: None,
+            until_s: 10.0,
         }
     }
 }
@@ -115,13 +118,13 @@ fn film(throw: Throw) -> SeenThrow {
         foot_m: domino.foot_m,
         height_m: domino.height_m,
     });
-    let from_ns = 1_000_000_000;
+    let span_s = [1.0, 1.0 + throw.until_s];
     look(
         &mut frames,
         &camera,
         appearance.lead_rgb,
         domino.as_ref(),
-        from_ns,
+        span_s.map(|s| (1e9 * s) as u64),
     )
     .unwrap()
 }
@@ -156,6 +159,21 @@ fn a_tip_on_the_board_and_a_domino_are_seen_at_every_bearing() {
             let last_s = seen.tip.last().unwrap().0;
             assert!(seen.end_s - last_s < 0.05, "unseen at the end, {told}");
         }
+    }
+}
+
+/// Somebody who clears up knocks it over.
+#[test]
+fn what_happens_after_the_throw_is_not_looked_at() {
+    for (until_s, fell) in [(0.7, false), (10.0, true)] {
+        let seen = film(Throw {
+            falls_rad: 1.5,
+            until_s,
+            ..Throw::default()
+        });
+        assert_eq!(seen.domino_down, Some(fell), "until {until_s} s");
+        let last_s = seen.tip.last().unwrap().0;
+        assert!(last_s <= until_s && seen.end_s <= until_s, "{last_s}");
     }
 }
 

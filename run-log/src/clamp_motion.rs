@@ -63,14 +63,15 @@ impl ClampMotion {
             self.path.display()
         );
         let late_s = self.late_s;
+        let longest_s = GAP_NS as f64 * 1e-9;
         let is_long = |[from_s, to_s]: &[f64; 2]| {
-            to_s - from_s > GAP_NS as f64 * 1e-9 && *to_s > 0.0 && *from_s < film_s
+            to_s - from_s > longest_s && *to_s > 0.0 && *from_s < film_s
         };
         let mut pairs = times_s.windows(2).map(|t| [t[0] + late_s, t[1] + late_s]);
         let gap = pairs.find(is_long);
         gap.map_or(Ok(()), |[from_s, to_s]| {
             bail!(
-                "`{}` has no motion of the clamp from {from_s:.2} to {to_s:.2} s: record it without a gap of more than 0.25 s",
+                "`{}` has no motion of the clamp from {from_s:.2} to {to_s:.2} s: record it without a gap of more than {longest_s} s",
                 self.path.display()
             )
         })

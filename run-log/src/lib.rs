@@ -28,6 +28,7 @@ mod clamp_motion;
 mod command_line;
 mod cycle_sample;
 mod cycles;
+mod earlier;
 mod explanation;
 pub mod files;
 pub mod ledger;
@@ -44,6 +45,7 @@ pub use clamp_motion::ClampMotion;
 pub use command_line::{CommandLine, quoted};
 pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 pub use cycles::{CYCLES_TABLE, Cycles};
+pub use earlier::Earlier;
 pub use explanation::{Explanation, Late, LimitExceeded, Row, Stop, explain};
 pub use margins::Margin;
 pub use mcap_file::{
@@ -53,6 +55,6 @@ pub use mcap_file::{
 pub use page::show;
 pub use run::{CellHere, NoRecording, Recording, Run};
 pub use run_record::{Film, MotionSpan, RunRecord, Settled, StageTimes, Tracked};
-pub use run_score::{Colours, Kept, ScoredBy};
+pub use run_score::{Colours, Kept, NamedFilm, ScoredBy, UNNAMED_COLOURS, require_same_target};
 pub use tracked_film::TrackedFilm;
 pub use unconfirmed::confirm;

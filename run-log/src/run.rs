@@ -145,8 +145,8 @@ impl Run {
         let summary = summary.with_context(|| not_a_throw(files::SUMMARY))?;
         ensure!(
             summary["ok"] != false,
-            "`{name}` ended with an error ({}): name another run, or its plan.json and the miss \
-             with --miss if it threw all the same",
+            "`{name}` ended with an error ({}): name another run, or, if it threw all the same, \
+             its plan.json and the miss to `wag plan again`",
             summary["error"]
                 .as_str()
                 .unwrap_or("of which nothing is kept")

@@ -9,7 +9,7 @@ use shared_types::{Plan, RopeEstimate, RopeParams, Task, Verdict};
 use std::path::Path;
 
 /// When a motion ran (CLOCK_MONOTONIC, ns).
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct MotionSpan {
     /// Deadline of the first setpoint.
     pub start_ns: u64,
@@ -91,6 +91,8 @@ pub struct RunRecord {
     pub seed: u64,
     /// The run's folder.
     pub run: String,
+    /// Whether the arm is simulated.
+    pub simulated: bool,
     /// What the throw is for.
     pub task: Task,
     /// Target in the arm's base frame (m); none of a wiggle alone.
@@ -112,6 +114,8 @@ pub struct RunRecord {
     /// Wall time of each stage.
     pub stages: StageTimes,
     wiggle: Option<Film>,
+    /// When the throw ran.
+    throw: Option<MotionSpan>,
     /// How the rope was tracked through the wiggle.
     pub track: Option<Tracked>,
     /// The rope.
@@ -176,8 +180,9 @@ impl RunRecord {
         self.wiggle = Some(film);
     }
 
-    /// Times count from the film of the throw where there was no wiggle.
+    /// Keeps when the throw ran; times count from its film where there was no wiggle.
     pub fn set_throw(&mut self, film: Film) {
+        self.throw = Some(film.motion);
         if self.wiggle.is_none() {
             self.epoch_ns = film.first_stamp_ns;
         }

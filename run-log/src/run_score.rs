@@ -1,14 +1,15 @@
-//! The score of a run's throw: by which colours it is measured, and what is kept of it.
+//! The score of a run's throw, or the verdict on it: by which colours it is found, and what is kept.
 
 use crate::{Run, files};
 use anyhow::{Context, Result, ensure};
 use nalgebra::Vector3;
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
-use shared_types::Task;
 use shared_types::ipc::message::ScoreResult;
+use shared_types::{Task, Verdict};
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Keys of `summary.json` after another measurement of the throw: the score that the run made
 /// itself, or why it made none, and by what the present one was made.
@@ -24,26 +25,79 @@ pub struct ScoredBy {
     pub camera: PathBuf,
     /// Colour of the tip.
     pub tip_rgb: [u8; 3],
-    /// Colour of the target.
-    pub target_rgb: [u8; 3],
+    /// Colour of the target, or of a lob's domino, where it was looked for.
+    pub target_rgb: Option<[u8; 3]>,
 }
 
-/// A score that a run keeps.
+/// What is named of a film and of its colours.
+#[derive(Debug)]
+pub struct NamedFilm {
+    /// The film.
+    pub video: Option<PathBuf>,
+    /// The camera's file.
+    pub camera: Option<PathBuf>,
+    /// Colours of tip and target.
+    pub colours: Colours,
+}
+
+/// What is missing where no colour is named.
+pub const UNNAMED_COLOURS: &str = "name the colours with --tip-rgb and --target-rgb";
+
+impl ScoredBy {
+    /// What is named, else what a run keeps of its throw.
+    ///
+    /// # Errors
+    /// Film, camera or a colour, a strike's target's too, are named by neither.
+    pub fn of(named: NamedFilm, run: Option<&Run>) -> Result<Self> {
+        let kept = || run.context("name film and camera with --video and --camera, or --run");
+        let camera = match named.camera {
+            Some(camera) => camera,
+            None => kept()?.folder().join(files::CAMERA),
+        };
+        let video = named.video.map_or_else(|| kept()?.throw_film(), Ok)?;
+        let of_run = run.map(Run::colours).transpose()?.unwrap_or_default();
+        let [tip_rgb, target_rgb] = [0, 1].map(|i| named.colours[i].or(of_run[i]));
+        let plan = run.map(Run::plan).transpose()?.flatten();
+        let is_strike = plan.is_none_or(|plan| plan.task == Task::Strike);
+        ensure!(target_rgb.is_some() || !is_strike, UNNAMED_COLOURS);
+        Ok(Self {
+            video,
+            camera,
+            tip_rgb: tip_rgb.context(UNNAMED_COLOURS)?,
+            target_rgb,
+        })
+    }
+}
+
+/// What a run keeps of a throw that was measured or judged again.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Kept {
+pub struct Kept<T> {
     folder: PathBuf,
-    /// The score that was there before.
-    pub replaced: Option<ScoreResult>,
+    /// What was there before.
+    pub replaced: Option<T>,
+    /// The same in words.
+    replaced_words: Option<String>,
     /// What speaks against it.
     pub warnings: Vec<String>,
 }
 
-impl fmt::Display for Kept {
+impl<T> Kept<T> {
+    fn contradicts(mut self, what: &str) -> Self {
+        self.warnings.push(format!(
+            "it contradicts the {what} that it replaces: look at the film and the colours; without \
+             --tip-rgb and --target-rgb, `wag score --run {}` takes the run's own",
+            self.folder.display()
+        ));
+        self
+    }
+}
+
+impl<T> fmt::Display for Kept<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let folder = self.folder.display();
         write!(f, "kept in `{folder}`")?;
-        if let Some(replaced) = &self.replaced {
-            write!(f, " in place of {:.1} mm", 1e3 * replaced.closest_m)?;
+        if let Some(replaced) = &self.replaced_words {
+            write!(f, " in place of {replaced}")?;
         }
         write!(f, "; `wag report {folder}` makes its report anew")
     }
@@ -55,21 +109,33 @@ fn contradict(one: &ScoreResult, other: &ScoreResult) -> bool {
     a_low > b_high || b_low > a_high
 }
 
+/// Whether two verdicts disagree about a condition.
+fn disagree(one: &Verdict, other: &Verdict) -> bool {
+    let mut pairs = one
+        .conditions
+        .iter()
+        .flat_map(|a| other.conditions.iter().map(move |b| (a, b)));
+    pairs.any(|(a, b)| a.name == b.name && a.met != b.met)
+}
+
 /// Colours of tip and target, as far as they are known.
 pub type Colours = [Option<[u8; 3]>; 2];
 
-/// Refuses a score whose target is not that of the throw: it is of another film, or of a camera
-/// that stands elsewhere than it is calibrated for.
-fn require_same_target(file: &Path, seen_m: [f64; 3], planned_m: [f64; 3]) -> Result<()> {
+/// Refuses a score whose target is not that of the throw: it is of another film, of something else
+/// of its colour, or of a camera that stands elsewhere than it is calibrated for.
+///
+/// # Errors
+/// In words.
+pub fn require_same_target(seen_m: [f64; 3], planned_m: [f64; 3]) -> Result<()> {
     /// Farthest that a target may be seen from where it was planned (m).
     const APART_MAX_M: f64 = 0.05;
     let apart_m = (Vector3::from(seen_m) - Vector3::from(planned_m)).norm();
     let at = |m: [f64; 3]| m.map(|m| format!("{m:.3}")).join(", ");
     ensure!(
         apart_m < APART_MAX_M,
-        "`{}`: the film shows a target at ({}) m, but the throw was planned for ({}) m, {:.1} cm \
-         away: it is the film of another throw, or the camera stands elsewhere",
-        file.display(),
+        "the film shows a target at ({}) m, but the throw was planned for ({}) m, {:.1} cm away: it \
+         is the film of another throw, something else has the target's colour, or the camera stands \
+         elsewhere",
         at(seen_m),
         at(planned_m),
         100.0 * apart_m
@@ -78,22 +144,19 @@ fn require_same_target(file: &Path, seen_m: [f64; 3], planned_m: [f64; 3]) -> Re
 }
 
 impl Run {
-    /// The figures of a run that threw a strike.
+    /// When the first setpoint of its throw was due (CLOCK_MONOTONIC, ns).
     ///
     /// # Errors
-    /// As [`Self::summary_of_throw`]; its throw was no strike.
-    pub fn summary_of_strike(&self) -> Result<Value> {
-        let summary = self.summary_of_throw()?;
-        let task = self.plan()?.map_or(Task::Strike, |plan| plan.task);
-        ensure!(
-            task == Task::Strike,
-            "`{}` is the run of a {}, whose verdict by camera is in its {}: the distance of tip and \
-             target is measured of strikes",
-            self.folder().display(),
-            task.name(),
-            files::SUMMARY
-        );
-        Ok(summary)
+    /// An older version, or a throw that no camera filmed, does not tell.
+    pub fn throw_began_ns(&self) -> Result<u64> {
+        let summary = self.summary()?.unwrap_or_default();
+        summary["throw"]["start_ns"].as_u64().with_context(|| {
+            format!(
+                "`{}` does not tell when the throw began (`throw.start_ns`): an older version made \
+                 it, or no camera filmed the throw",
+                self.folder().join(files::SUMMARY).display()
+            )
+        })
     }
 
     /// Colours of tip and target by which it was to measure its throw; where it knew none,
@@ -111,45 +174,71 @@ impl Run {
     /// run itself measured stays beside it.
     ///
     /// # Errors
-    /// As [`Self::summary_of_strike`]; the film shows another target than the plan's.
-    pub fn keep_score(&self, score: &ScoreResult, by: &ScoredBy) -> Result<Kept> {
-        let mut summary = self.summary_of_strike()?;
-        let file = self.folder().join(files::SUMMARY);
+    /// As [`Self::summary_of_throw`]; the film shows another target than the plan's.
+    pub fn keep_score(&self, score: &ScoreResult, by: &ScoredBy) -> Result<Kept<ScoreResult>> {
+        let mut summary = self.summary_of_throw()?;
         if let Some(plan) = self.plan()? {
-            require_same_target(&file, score.target_m, plan.target_m)?;
+            require_same_target(score.target_m, plan.target_m)?;
         }
-        let before = summary["score"].take();
-        let replaced: Option<ScoreResult> = serde_json::from_value(before.clone()).ok();
-        if summary[SCORED_BY].is_null() {
-            let failed = summary["score_failed"].take();
-            summary[SCORE_OF_RUN] = if before.is_null() { failed } else { before };
-        }
-        summary["score"] = serde_json::to_value(score)?;
-        summary[SCORED_BY] = serde_json::to_value(by)?;
         if let Some(figures) = summary.as_object_mut() {
-            figures.remove("score_failed");
             // A demo tells it a second time.
             figures
                 .entry("stereo_tip_target_distance_m")
                 .and_modify(|m| *m = score.closest_m.into());
         }
-        files::write_json(&file, &summary)?;
-        let folder = self.folder().to_owned();
-        let mut warnings = Vec::new();
-        if replaced.is_some_and(|replaced| contradict(&replaced, score)) {
-            warnings.push(format!(
-                "it contradicts the score that it replaces: look at the film and the colours; \
-                 without --tip-rgb and --target-rgb, `wag score --run {}` takes the run's own",
-                folder.display()
-            ));
+        let mut kept = self.keep(summary, ("score", score), by)?;
+        if let Some(replaced) = kept.replaced {
+            kept.replaced_words = Some(format!("{:.1} mm", 1e3 * replaced.closest_m));
+            if contradict(&replaced, score) {
+                kept = kept.contradicts("score");
+            }
         }
         if let Err(why) = self.miss_m() {
-            warnings.push(format!("{why:#}"));
+            kept.warnings.push(format!("{why:#}"));
         }
+        Ok(kept)
+    }
+
+    /// Keeps how a camera judged its lob or drape, in the same way.
+    ///
+    /// # Errors
+    /// As [`Self::summary_of_throw`].
+    pub fn keep_verdict(&self, verdict: &Verdict, by: &ScoredBy) -> Result<Kept<Verdict>> {
+        let summary = self.summary_of_throw()?;
+        let mut kept = self.keep(summary, ("camera_verdict", verdict), by)?;
+        let disagrees = kept.replaced.as_ref().map(|replaced| {
+            kept.replaced_words = Some(format!("`{replaced}`"));
+            disagree(replaced, verdict)
+        });
+        if disagrees == Some(true) {
+            kept = kept.contradicts("verdict");
+        }
+        Ok(kept)
+    }
+
+    fn keep<T: Serialize + DeserializeOwned>(
+        &self,
+        mut summary: Value,
+        (key, value): (&str, &T),
+        by: &ScoredBy,
+    ) -> Result<Kept<T>> {
+        let before = summary[key].take();
+        let replaced = serde_json::from_value(before.clone()).ok();
+        if summary[SCORED_BY].is_null() {
+            let failed = summary["score_failed"].take();
+            summary[SCORE_OF_RUN] = if before.is_null() { failed } else { before };
+        }
+        summary[key] = serde_json::to_value(value)?;
+        summary[SCORED_BY] = serde_json::to_value(by)?;
+        if let Some(figures) = summary.as_object_mut() {
+            figures.remove("score_failed");
+        }
+        files::write_json(&self.folder().join(files::SUMMARY), &summary)?;
         Ok(Kept {
-            folder,
+            folder: self.folder().to_owned(),
             replaced,
-            warnings,
+            replaced_words: None,
+            warnings: Vec::new(),
         })
     }
 
@@ -163,18 +252,18 @@ impl Run {
         let name = path.display();
         let miss_m = serde_json::from_value(score["miss_m"].clone()).ok();
         let miss_m = miss_m.with_context(|| {
-            format!("`{name}` has no miss by the camera (`score.miss_m`): name it with --miss, or measure it with `wag score --run`")
+            format!("`{name}` has no miss by the camera (`score.miss_m`): measure it with `wag score --run`, or name it to `wag throw --again RUN --miss X,Y,Z`")
         })?;
         let [low_m, high_m]: [f64; 2] = serde_json::from_value(score["interval_m"].clone())
             .with_context(|| format!("`{name}`: `score.interval_m`"))?;
         ensure!(
             high_m - low_m < INTERVAL_MAX_M,
             "`{name}`: the camera knows the distance from {low_m:.3} to {high_m:.3} m only \
-             (`score.interval_m`); look at the film and name the miss with --miss"
+             (`score.interval_m`); look at the film, and name the miss to `wag throw --again RUN --miss X,Y,Z`"
         );
         let target_m = serde_json::from_value(score["target_m"].clone()).ok();
         if let Some((target_m, plan)) = target_m.zip(self.plan()?) {
-            require_same_target(&path, target_m, plan.target_m)?;
+            require_same_target(target_m, plan.target_m).with_context(|| format!("`{name}`"))?;
         }
         Ok(miss_m)
     }

@@ -99,10 +99,10 @@ async function begin(from, run) {
     const [moved, words] = await post("rig?" + query({ seed: told.rig[0], task }));
     if (!moved) return say(words);
   }
-  const clear = byId("clear").checked ? "yes" : "";
-  const [, words] = await post("begin?" + query({ from, run: run || "", clear, task, x, y, z,
+  const ticked = (id) => (byId(id).checked ? "yes" : ""), clear = ticked("clear");
+  const [, words] = await post("begin?" + query({ from, run: run || "", clear, acknowledge: ticked("acknowledge"), task, x, y, z,
     length_m: measured("length"), lead_mass_kg: measured("mass") }));
-  byId("clear").checked = false;
+  for (const id of ["clear", "acknowledge"]) byId(id).checked = false;
   say(words);
   poll(true);
 }
@@ -263,7 +263,7 @@ async function history() {
       entry.result === "ok" ? "done" : entry.problems[0] || entry.result, cm(entry.predicted_m), cm(entry.camera_m), cm(entry.true_m),
       make("a", { href: `report/${name}`, target: "_blank", rel: "noopener" }, "report")])]);
   const kept = byId("earlier").value, ropes = pastRuns.filter((run) => run.has_rope);
-  byId("earlier").replaceChildren(...ropes.map((run) => make("option", {}, run.name)));
+  byId("earlier").replaceChildren(...ropes.map((run) => make("option", { value: run.name }, run.name + (run.is_simulated ? " (simulated)" : ""))));
   if (ropes.some((run) => run.name === kept)) byId("earlier").value = kept;
   buttons();
 }
@@ -277,6 +277,7 @@ async function look() {
   studio.work = work;
   document.body.classList.toggle("looking", !told.is_local);
   byId("rig").hidden = !told.rig;
+  byId("acknowledgement").hidden = !told.is_service;
   if (first && told.rig) [byId("seed").value, byId("task").value] = told.rig;
   if (first) { first = false; history(); reach(); }
   showWork(work);

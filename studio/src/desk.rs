@@ -64,6 +64,8 @@ struct Told {
     is_local: bool,
     /// The seed and task of the simulated rig; none with an arm that is there.
     rig: Option<(u64, Task)>,
+    /// Whether the controller is a service, whose stop somebody must acknowledge.
+    is_service: bool,
     work: Option<View>,
 }
 
@@ -145,6 +147,7 @@ impl Workplace {
         Told {
             is_local,
             rig: state.rig.as_ref().map(|rig| (rig.seed, rig.task)),
+            is_service: self.settings.cell.is_service(),
             work: state.work.as_ref().map(Work::view),
         }
     }

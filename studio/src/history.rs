@@ -2,7 +2,7 @@
 
 use anyhow::{Context, ensure};
 use run_log::ledger::{self, Entry};
-use run_log::{CellHere, files};
+use run_log::{CellHere, Run, files};
 use serde::Serialize;
 use shared_types::Task;
 use std::path::{Path, PathBuf};
@@ -20,6 +20,8 @@ pub(crate) struct Past {
     has_rope: bool,
     /// Whether its throw can be corrected.
     has_throw: bool,
+    /// Whether its arm was simulated: a real one refuses its rope.
+    is_simulated: bool,
     entry: Entry,
 }
 
@@ -55,6 +57,7 @@ fn past(folder: &Path) -> Option<Past> {
         has_throw: entry.camera_m.is_some()
             && entry.task.as_deref() == Some(Task::Strike.name())
             && folder.join(files::PLAN).is_file(),
+        is_simulated: Run::open(folder).is_ok_and(|run| run.is_simulated().unwrap_or(false)),
         entry,
     })
 }

@@ -29,6 +29,8 @@ pub(crate) struct Job {
     run: Option<PathBuf>,
     length_m: Option<f64>,
     lead_mass_kg: Option<f64>,
+    /// Somebody knows why the controller has stopped.
+    acknowledges: bool,
 }
 
 /// A number of the query.
@@ -94,6 +96,7 @@ impl Job {
             run,
             length_m: within(number(asked, "length_m")?, "length_m", RANGES[1].max)?,
             lead_mass_kg: number(asked, "lead_mass_kg")?,
+            acknowledges: asked.value("acknowledge") == Some("yes"),
         })
     }
 
@@ -137,6 +140,9 @@ impl Job {
             }
         }
         words.extend_from_slice(reached_by);
+        if self.acknowledges {
+            words.push("--acknowledge".to_owned());
+        }
         let rgb = target_rgb.filter(|_| self.from != From::WiggleAlone);
         words.extend(
             rgb.iter()
@@ -197,6 +203,10 @@ mod tests {
         assert_eq!(
             words("from=wiggle-alone&clear=yes"),
             format!("--json --events wiggle {begin} --arm a")
+        );
+        assert_eq!(
+            words("from=wiggle-alone&clear=yes&acknowledge=yes"),
+            format!("--json --events wiggle {begin} --arm a --acknowledge")
         );
         let old = dir.path().join("old");
         let old = old.display();

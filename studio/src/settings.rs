@@ -26,6 +26,16 @@ pub enum Cell {
     },
 }
 
+impl Cell {
+    /// Whether the arm is reached by a controller that runs already.
+    pub(crate) fn is_service(&self) -> bool {
+        match self {
+            Self::Simulated { .. } => false,
+            Self::Real { reached_by, .. } => reached_by.iter().any(|word| word == "--controller"),
+        }
+    }
+}
+
 /// What a studio works with.
 #[derive(Debug)]
 pub struct Settings {

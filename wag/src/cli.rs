@@ -131,7 +131,8 @@ pub enum Command {
     },
     /// List runs, compare two of them, rerun one.
     Ledger(LedgerArgs),
-    /// Measure the closest approach of tip and target in a stereo video.
+    /// Measure the closest approach of tip and target in a stereo video; judge a lob or drape by
+    /// its film again.
     Score(ScoreArgs),
     /// Estimate or check the camera's extrinsics.
     #[command(subcommand)]

@@ -165,7 +165,7 @@ pub(super) fn look(
         camera,
         tip_rgb,
         domino,
-        from_ns,
+        span_ns,
         strobe: picture,
     } = &call.request
     else {
@@ -174,7 +174,7 @@ pub(super) fn look(
     if !recording.has_both() {
         return Err("nothing is recorded to look at; record first, both images".into());
     }
-    let seen = crate::score::look(recording, camera, *tip_rgb, domino.as_ref(), *from_ns);
+    let seen = crate::score::look(recording, camera, *tip_rgb, domino.as_ref(), *span_ns);
     let drawn = picture.as_ref().map_or(Ok(()), |path| {
         write_throw(recording, (None, RESTS_S), camera, Path::new(path))
     });
@@ -236,5 +236,12 @@ mod tests {
         let mut film = open_video(Path::new(&format!("{name}_8x4.yuyv")), None).unwrap();
         assert_eq!(film.len(), 2);
         assert_eq!([0, 1].map(|i| film.read(i).unwrap()), [frame(1), frame(2)]);
+        // Another does not take its place.
+        let again = keep(&mut recording, &name, &stop).unwrap_err();
+        assert!(again.to_string().contains("not replaced"), "{again}");
+        std::fs::remove_file(format!("{name}_8x4.yuyv")).unwrap();
+        assert!(keep(&mut recording, &name, &stop).is_err(), "nor its times");
+        keep(&mut recording, &format!("{name}-2"), &stop).unwrap();
+        assert_eq!(files(), 3);
     }
 }

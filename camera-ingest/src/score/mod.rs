@@ -20,6 +20,7 @@ use scene::{Scene, Target, blob_error, read_sized};
 use serde::Serialize;
 use shared_types::StereoCamera;
 use shared_types::ipc::message::ScoreResult;
+use std::fmt;
 
 use crate::calib::extrinsics::Correspondence;
 use crate::source::StereoSource;
@@ -41,6 +42,19 @@ pub struct Score {
     pub target_m: [f64; 3],
     /// Smoothed tip centre per frame it was seen in: (s, world m).
     pub tip_path: Vec<(f64, [f64; 3])>,
+}
+
+impl fmt::Display for Score {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [closest, least, most] =
+            [self.closest_m, self.interval_m[0], self.interval_m[1]].map(|m| 1e3 * m);
+        let [x, y, z] = self.miss_m;
+        write!(
+            f,
+            "closest approach {closest:.1} mm ({least:.1} to {most:.1}) at {:.4} s; miss {x:.4},{y:.4},{z:.4} m (tip minus target)",
+            self.time_s
+        )
+    }
 }
 
 impl From<&Score> for ScoreResult {

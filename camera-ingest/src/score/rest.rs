@@ -44,8 +44,8 @@ const LIES_HIDDEN: f64 = 0.08;
 /// Least new area (samples).
 const MIN_NEW_AREA: f64 = 1.0;
 
-/// Looks for tip and domino in all frames; `from_ns` is the begin of the throw
-/// (CLOCK_MONOTONIC).
+/// Looks for tip and domino in all frames to the end of the span, which begins with the throw
+/// (CLOCK_MONOTONIC, ns): what comes later, somebody who clears up say, is not the throw's.
 ///
 /// # Errors
 /// Unreadable frames, colours without chroma, or a tip that is not seen.
@@ -54,9 +54,9 @@ pub fn look(
     camera: &StereoCamera,
     tip_rgb: [u8; 3],
     domino: Option<&DominoLook>,
-    from_ns: u64,
+    [from_ns, to_ns]: [u64; 2],
 ) -> Result<SeenThrow, ScoreError> {
-    let frames = source.len();
+    let frames = frames_until(source, to_ns)?;
     if frames < FIRST_FRAMES + DOMINO_FRAMES {
         return Err(ScoreError::Input(format!(
             "the film has {frames} frames, at least {} are needed",
@@ -110,6 +110,20 @@ pub fn look(
         domino_down: fell,
         ..SeenThrow::default()
     })
+}
+
+/// How many frames were taken until an instant.
+fn frames_until(source: &mut dyn StereoSource, to_ns: u64) -> Result<usize, ScoreError> {
+    let (mut least, mut most) = (0, source.len());
+    while least < most {
+        let middle = usize::midpoint(least, most);
+        if source.read(middle)?.0.stamp_ns <= to_ns {
+            least = middle + 1;
+        } else {
+            most = middle;
+        }
+    }
+    Ok(least)
 }
 
 /// Whether the domino lies; `None` where it was not seen at first, or is covered.

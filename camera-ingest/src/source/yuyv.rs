@@ -13,12 +13,13 @@ use super::stored::{Pictures, Stored};
 /// # Errors
 /// No size in the name, no times, no such file, or a length that does not fit.
 pub(super) fn open(path: &Path, rate_hz: Option<f64>) -> Result<Stored, SourceError> {
+    let file = File::open(path).map_err(SourceError::io(path))?;
     let size_px = size_in_name(path).ok_or_else(|| {
         let reason = "its name does not end in the size of both images together, as in \
                       `wiggle_1344x376.yuyv`; rename it";
         SourceError::video(path, reason)
     })?;
-    let (file, frames) = whole_frames(path, size_px)?;
+    let frames = whole_frames(path, &file, size_px)?;
     let stamps = stamps::beside(path, &path.with_extension("csv"), rate_hz, frames)?;
     Ok(Stored::new(path, Pictures::Yuyv(file, size_px), stamps))
 }
@@ -35,15 +36,13 @@ fn size_in_name(path: &Path) -> Option<[usize; 2]> {
     Some([side(width)?, side(height)?])
 }
 
-/// The file, and how many frames are in it.
-fn whole_frames(path: &Path, size_px: [usize; 2]) -> Result<(File, usize), SourceError> {
-    let io = SourceError::io(path);
-    let file = File::open(path).map_err(&io)?;
-    let bytes = file.metadata().map_err(&io)?.len();
+/// How many frames are in the file.
+fn whole_frames(path: &Path, file: &File, size_px: [usize; 2]) -> Result<usize, SourceError> {
+    let bytes = file.metadata().map_err(SourceError::io(path))?.len();
     let frame = (size_px[0] * size_px[1] * 2) as u64;
     let frames = bytes.checked_div(frame).unwrap_or(0);
     match usize::try_from(frames) {
-        Ok(count) if count > 0 && frames * frame == bytes => Ok((file, count)),
+        Ok(count) if count > 0 && frames * frame == bytes => Ok(count),
         _ => {
             let [width, height] = size_px;
             let reason = format!(
@@ -74,6 +73,9 @@ mod tests {
     fn frames_have_the_times_beside_them_and_damage_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name| folder.path().join(name);
+        // A file that is not there has no name to complain of.
+        let absent = super::open(&at("sample.yuyv"), None).err().unwrap();
+        assert!(!absent.to_string().contains("rename"), "{absent}");
         let (raw, csv) = (at("r_8x2.yuyv"), at("r_8x2.csv"));
         std::fs::write(&raw, (0..64).collect::<Vec<u8>>()).unwrap();
         let open = |rate_hz| super::open(&raw, rate_hz);

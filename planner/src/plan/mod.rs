@@ -7,6 +7,7 @@ mod config;
 mod drape;
 mod ensemble;
 mod error;
+mod filmed;
 mod finalists;
 mod lob;
 mod planning;

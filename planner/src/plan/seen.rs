@@ -198,9 +198,14 @@ fn rest(seen: &SeenThrow, from_s: f64) -> Option<RestMeasures> {
 mod tests {
     use super::*;
     use crate::PlannerConfig;
+    use arm_model::{JointTrajectory, JointVector};
     use shared_types::Task;
 
     const TARGET_M: [f64; 3] = [0.8, 0.0, 0.2];
+
+    fn rope() -> RopeParams {
+        RopeParams::from_array([22.0, 0.55, 0.02, 0.3, 0.008, 0.06, 0.06, 0.03, 0.8])
+    }
 
     /// Seen 60 times a second for 4 s.
     fn seen(tip: impl Fn(f64) -> [f64; 3]) -> SeenThrow {
@@ -216,9 +221,8 @@ mod tests {
 
     fn judge(task: Task, seen: &SeenThrow) -> Result<SeenVerdict, String> {
         let settings = PlannerConfig::default();
-        let rope = RopeParams::from_array([22.0, 0.55, 0.02, 0.3, 0.008, 0.06, 0.06, 0.03, 0.8]);
         let goal = settings.goal(task, TARGET_M);
-        judge_seen(&goal, (&rope, [0.5, 0.0, 0.6]), &settings.cell, seen)
+        judge_seen(&goal, (&rope(), [0.5, 0.0, 0.6]), &settings.cell, seen)
     }
 
     #[test]
@@ -251,6 +255,25 @@ mod tests {
         assert!(judge(Task::Lob, &noisy).unwrap().verdict.success);
         noisy.tip[221].1 = [0.0; 3];
         assert!(!judge(Task::Lob, &noisy).unwrap().verdict.success);
+    }
+
+    #[test]
+    fn a_film_that_ends_before_the_rope_must_be_at_rest_is_refused() {
+        let settings = PlannerConfig::default();
+        let goal = settings.goal(Task::Lob, TARGET_M);
+        let still = [JointVector::default(); 2];
+        let motion = JointTrajectory::new(&[0.0, 0.5], &still).unwrap();
+        let until_s = goal.observed_s(&motion);
+        let judge = |until_s: f64| {
+            let mut film = seen(|t_s| [if t_s < 1.5 { 0.5 } else { 0.82 }, 0.0, 0.23]);
+            film.tip.retain(|(t_s, _)| *t_s <= until_s);
+            film.end_s = until_s;
+            goal.judge_film((&motion, &rope()), &settings.cell, &film)
+        };
+        let whole = judge(until_s).unwrap();
+        assert!(whole.success, "{whole:?}");
+        let short = judge(until_s - 0.2).unwrap_err();
+        assert!(short.contains("is it this throw's film"), "{short}");
     }
 
     #[test]

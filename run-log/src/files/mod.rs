@@ -31,6 +31,10 @@ pub const COMMAND: &str = "command.json";
 pub const SUMMARY: &str = "summary.json";
 /// File of a run folder with the cell it ran in.
 pub const CELL: &str = "config/cell.toml";
+/// What its planner was told.
+pub const PLANNER: &str = "config/planner.toml";
+/// What its controller was told.
+pub const CONTROLLER: &str = "config/rt-controller.toml";
 /// File of a run folder with the camera's calibration and extrinsics.
 pub const CAMERA: &str = "camera.toml";
 /// File of a run folder with the tracked keypoints.

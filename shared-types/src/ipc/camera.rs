@@ -53,8 +53,8 @@ pub enum CameraRequest {
         tip_rgb: [u8; 3],
         /// The domino to look for, if any.
         domino: Option<DominoLook>,
-        /// When the throw began (CLOCK_MONOTONIC, ns).
-        from_ns: u64,
+        /// When the throw began, and until when it is looked at (CLOCK_MONOTONIC, ns).
+        span_ns: [u64; 2],
         /// Where to write a multiple-exposure picture of the throw (PNG), if anywhere.
         strobe: Option<String>,
     },

@@ -42,7 +42,8 @@ function tipCurves(scene) {
   const curves = [[scene.planned, "var(--planned)", true], [scene.tip, "var(--tip)", false]].filter(([c]) => c);
   byId("tip").hidden = !curves.length;
   if (!curves.length) return;
-  const t = strike(scene), e = data.error, size = [450, 190];
+  // A drape's distances are not those of the tip.
+  const t = strike(scene), e = (data.summary || {}).task === "drape" ? {} : data.error, size = [450, 190];
   const marks = [{ t, text: `closest approach, ${t.toFixed(2)} s` }];
   const of = (key, factor) => curves.map(([c, colour, dashed]) =>
     ({ t: instants(c), values: c[key].map((v) => v * factor), colour, dashed }));

@@ -17,15 +17,16 @@ function head() {
 
 function errors() {
   const e = data.error, range = (i, of) => (i ? `${inWords(i[0])} to ${inWords(i[1])} (${of})` : "");
-  const throws = data.scenes.find((s) => s.tip) || {}, of = (curve) => (curve ? curve.closest : {});
-  const [planned, replayed] = [of(throws.planned), of(throws.tip)];
+  // A drape's distance is that of the rope's middle, which no replay of a tip tells.
+  const drapes = (data.summary || {}).task === "drape", of = (curve) => (curve && !drapes ? curve.closest : {});
+  const throws = data.scenes.find((s) => s.tip) || {}, [planned, replayed] = [of(throws.planned), of(throws.tip)];
   const rows = [["planned", e.planned_m, planned, range(e.forecast_90_m, "90 % of the forecast")],
     ["replayed: the identified rope, simulated under the joints of the run", replayed.distance_m, replayed, ""],
     ["measured by the camera", e.camera_m, {}, range(e.camera_interval_m, "2 standard errors")],
     ["true (simulated rig)", e.true_m, {}, ""]].filter((r) => typeof r[1] === "number");
   if (!rows.length) return hide("outcome");
   const number = (v) => (typeof v === "number" ? v.toFixed(2) : "–");
-  fill(byId("errors"), [["closest approach of tip and target", "distance", "interval", "at (s)", "tip speed (m/s)"],
+  fill(byId("errors"), [[drapes ? "distance of the rope's middle from the edge" : "closest approach of tip and target", "distance", "interval", "at (s)", "tip speed (m/s)"],
     ...rows.map(([name, m, at, i]) => [name, inWords(m), i || "–", number(at.time_s), number(at.speed_m_s)])]);
 }
 

@@ -118,10 +118,11 @@ pub struct ScoreArgs {
     /// Colour of the tip, R,G,B from 0 to 255; may be left out with --run.
     #[arg(long)]
     pub tip_rgb: Option<Colour>,
-    /// Colour of the target, R,G,B from 0 to 255; may be left out with --run.
+    /// Colour of the target or of a lob's domino, R,G,B from 0 to 255; may be left out with --run.
     #[arg(long)]
     pub target_rgb: Option<Colour>,
-    /// Folder of the throw's run, which tells camera and colours and keeps the miss, for `--again`.
+    /// Folder of the throw's run, which tells camera and colours and keeps the miss, for `--again`,
+    /// or the verdict on a lob or drape.
     #[arg(long, value_name = "RUN")]
     pub run: Option<PathBuf>,
 }

@@ -179,7 +179,13 @@ const fn can_ask(terminal: bool, json: bool) -> bool {
 /// Makes sure that the area around the arm is clear before it is brought up: by `--yes`, or by
 /// the operator who types `word`. A simulated arm is in nobody's way.
 pub fn require_clear_area(arm: &ArmArgs, address: &ArmAddress, word: &str) -> Outcome {
-    if arm.yes || !asks(arm, address) {
+    if !asks(arm, address) {
+        return Ok(());
+    }
+    eprintln!(
+        "Board or wall of an earlier throw must be away: no move and no wiggle goes around it."
+    );
+    if arm.yes {
         return Ok(());
     }
     let refuse = |why: &str| {

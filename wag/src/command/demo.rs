@@ -44,7 +44,8 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
         None => Entry::Wiggle,
     };
     let folder = RunFolder::create(args.out.as_deref(), &format!("demo-{seed}"))?;
-    let record = RunRecord::new("demo", seed, (args.task, Some(target_m)), &folder.path);
+    let mut record = RunRecord::new("demo", seed, (args.task, Some(target_m)), &folder.path);
+    record.simulated = true;
     let ball_m = Some(target_m).filter(|_| args.task == Task::Strike);
     let rig_config = pipeline::rig_config(&folder, &rig.seeing(args.task), seed, ball_m);
     in_folder(&folder, record, |session, record| {

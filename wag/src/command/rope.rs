@@ -1,6 +1,7 @@
 //! `wag rope new`: a rope file from what a laboratory can measure.
 
 use crate::cli::NewRopeArgs;
+use crate::pipeline::RunFolder;
 use cli_output::{OrInput, Outcome};
 use run_log::files::write_new_rope;
 use serde_json::{Value, json};
@@ -8,6 +9,7 @@ use shared_types::RopeParams;
 use shared_types::rope::RANGES;
 
 pub fn new(args: &NewRopeArgs) -> Outcome<Option<Value>> {
+    RunFolder::refuse_existing(&args.out)?;
     let length_m = args.length;
     // What its mass is per length; the length may be a guess, but then is known.
     let middle = RANGES.map(|range| (range.min * range.max).sqrt());
@@ -29,11 +31,14 @@ pub fn new(args: &NewRopeArgs) -> Outcome<Option<Value>> {
     }
     let rope = RopeParams::from_array(values);
     rope.validate().or_input()?;
-    write_new_rope(&args.out, &rope, named.map(|named| named.is_some())).or_failed()?;
+    let mut measured = named.map(|named| named.is_some());
+    // A mass by a guessed length is a guess.
+    measured[5] &= length_m.is_some();
+    write_new_rope(&args.out, &rope, measured).or_failed()?;
     let guessed: Vec<&str> = RANGES
         .iter()
-        .zip(named)
-        .filter(|(_, named)| named.is_none())
+        .zip(measured)
+        .filter(|(_, measured)| !measured)
         .map(|(range, _)| range.label)
         .collect();
     println!("`{}`; guessed: {}", args.out.display(), guessed.join(", "));

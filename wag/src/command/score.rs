@@ -1,13 +1,17 @@
-//! `wag score`: closest approach of tip and target from stereo video.
+//! `wag score`: what a stereo film shows of a throw: the closest approach of tip and target, or
+//! what became of a lob or drape.
 
 use crate::cli::ScoreArgs;
+use crate::config;
 use anyhow::Context;
-use camera_ingest::{ScoreError, load_camera, open_video, score};
+use camera_ingest::{ScoreError, load_camera, look, open_video, score};
 use cli_output::{Failure, OrInput, Outcome, Stage};
-use run_log::{Run, ScoredBy, files};
+use planner::PlannerConfig;
+use run_log::{Kept, NamedFilm, Run, ScoredBy, UNNAMED_COLOURS, files};
 use serde_json::{Value, json};
 use shared_types::ipc::message::ScoreResult;
-use std::path::{Path, PathBuf};
+use shared_types::{Plan, StereoCamera, Task};
+use std::path::Path;
 
 /// Bad input, or a marker that was looked for and not found.
 pub fn not_scored(error: ScoreError, video: &Path) -> Failure {
@@ -15,63 +19,81 @@ pub fn not_scored(error: ScoreError, video: &Path) -> Failure {
     Failure::of(error.is_input(), anyhow::Error::new(error).context(video))
 }
 
-/// The film and the camera's file: those that are named, else what the run keeps of its throw.
-fn filmed(args: &ScoreArgs, run: Option<&Run>) -> anyhow::Result<(PathBuf, PathBuf)> {
-    let kept = || run.context("name film and camera with --video and --camera, or --run");
-    let camera = match &args.camera {
-        Some(camera) => camera.clone(),
-        None => kept()?.folder().join(files::CAMERA),
-    };
-    let video = args.video.clone().map_or_else(|| kept()?.throw_film(), Ok);
-    Ok((video?, camera))
+/// Measures a strike.
+fn measured(
+    args: &ScoreArgs,
+    run: Option<&Run>,
+    (by, camera): (ScoredBy, &StereoCamera),
+) -> Outcome<Value> {
+    let target_rgb = by.target_rgb.context(UNNAMED_COLOURS).or_input()?;
+    let mut frames = open_video(&by.video, args.fps).or_input()?;
+    let stage = Stage::begin("score");
+    let found = score(&mut frames, camera, by.tip_rgb, target_rgb)
+        .map_err(|error| not_scored(error, &by.video))?;
+    stage.done("tip and target measured");
+    println!("{found}");
+    let score = ScoreResult::from(&found);
+    let mut value = serde_json::to_value(score).or_failed()?;
+    if let Some(run) = run {
+        let kept = run.keep_score(&score, &by).or_input()?;
+        value["replaced_m"] = json!(kept.replaced.map(|r| r.closest_m));
+        tell(&kept);
+    }
+    Ok(value)
+}
+
+/// Judges a lob or drape as its run did: the film's times are those of the run.
+fn judged(
+    args: &ScoreArgs,
+    (run, plan): (&Run, &Plan),
+    (by, camera): (ScoredBy, &StereoCamera),
+) -> Outcome<Value> {
+    let cell = config::cell_of(run).or_input()?;
+    let kept = run.folder().join(files::PLANNER);
+    let kept = kept.is_file().then_some(kept.as_path());
+    let settings: PlannerConfig = config::here(kept).or_input()?;
+    let goal = settings.goal(plan.task, plan.target_m);
+    let domino = by.target_rgb.and_then(|rgb| goal.domino_look(&cell, rgb));
+    let span_ns = goal.span_ns(&plan.trajectory, run.throw_began_ns().or_input()?);
+    let mut frames = open_video(&by.video, args.fps).or_input()?;
+    let stage = Stage::begin("score");
+    let seen = look(&mut frames, camera, by.tip_rgb, domino.as_ref(), span_ns)
+        .map_err(|error| not_scored(error, &by.video))?;
+    let verdict = goal.judge_film((&plan.trajectory, &plan.rope), &cell, &seen);
+    let verdict = verdict.map_err(anyhow::Error::msg).or_failed()?;
+    stage.done("tip and scene looked at");
+    println!("{}: {verdict}", plan.task.name());
+    let kept = run.keep_verdict(&verdict, &by).or_input()?;
+    tell(&kept);
+    Ok(json!({ "task": plan.task, "camera_verdict": verdict, "replaced_verdict": kept.replaced }))
+}
+
+fn tell<T>(kept: &Kept<T>) {
+    println!("{kept}");
+    for warning in &kept.warnings {
+        eprintln!("warning: {warning}");
+    }
 }
 
 pub fn run(args: &ScoreArgs) -> Outcome<Option<Value>> {
     let run = args.run.as_deref().map(Run::open).transpose().or_input()?;
     // One that cannot keep a score is refused before anything is measured.
     if let Some(run) = &run {
-        run.summary_of_strike().or_input()?;
+        run.summary_of_throw().or_input()?;
         files::check_writable(&run.folder().join(files::SUMMARY)).or_input()?;
     }
-    let of_run = run.as_ref().map(Run::colours).transpose().or_input()?;
-    let named = [args.tip_rgb, args.target_rgb].map(|colour| colour.map(|named| named.0));
-    let [tip_rgb, target_rgb] = [0, 1].map(|i| named[i].or(of_run.and_then(|of| of[i])));
-    let (video, camera) = filmed(args, run.as_ref()).or_input()?;
-    let known = tip_rgb
-        .zip(target_rgb)
-        .context("name the colours with --tip-rgb and --target-rgb");
-    let (tip_rgb, target_rgb) = known.or_input()?;
-    let sees = load_camera(&camera).or_input()?;
-    let mut frames = open_video(&video, args.fps).or_input()?;
-    let stage = Stage::begin("score");
-    let found = score(&mut frames, &sees, tip_rgb, target_rgb)
-        .map_err(|error| not_scored(error, &video))?;
-    let [x, y, z] = found.miss_m;
-    let line = format!(
-        "closest approach {:.1} mm ({:.1} to {:.1}) at {:.4} s; miss {x:.4},{y:.4},{z:.4} m (tip minus target)",
-        1e3 * found.closest_m,
-        1e3 * found.interval_m[0],
-        1e3 * found.interval_m[1],
-        found.time_s
-    );
-    stage.done("tip and target measured");
-    println!("{line}");
-    let score = ScoreResult::from(&found);
-    let mut value = serde_json::to_value(score).or_failed()?;
-    if let Some(run) = &run {
-        let by = ScoredBy {
-            video,
-            camera,
-            tip_rgb,
-            target_rgb,
-        };
-        let kept = run.keep_score(&score, &by).or_input()?;
-        println!("{kept}");
-        for warning in &kept.warnings {
-            eprintln!("warning: {warning}");
-        }
-        value["replaced_m"] = json!(kept.replaced.map(|r| r.closest_m));
-    }
+    let named = NamedFilm {
+        video: args.video.clone(),
+        camera: args.camera.clone(),
+        colours: [args.tip_rgb, args.target_rgb].map(|colour| colour.map(|named| named.0)),
+    };
+    let by = ScoredBy::of(named, run.as_ref()).or_input()?;
+    let sees = load_camera(&by.camera).or_input()?;
+    let plan = run.as_ref().and_then(|run| Some((run, run.plan().ok()??)));
+    let mut value = match plan {
+        Some((run, plan)) if plan.task != Task::Strike => judged(args, (run, &plan), (by, &sees)),
+        _ => measured(args, run.as_ref(), (by, &sees)),
+    }?;
     value["ok"] = true.into();
     value["command"] = "score".into();
     value["run"] = json!(args.run);

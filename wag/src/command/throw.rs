@@ -11,7 +11,7 @@ use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
 use arm_model::{ArmResponse, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
 use planner::plan::warnings;
-use rt_controller::os::now_ns;
+use run_log::Run;
 use run_log::files::{self, read_plan};
 use serde_json::{Value, json};
 use session::Session;
@@ -49,15 +49,10 @@ pub fn drive(
     let start = trajectory.start();
     let is_asked = asks(arm, &address);
     let work = |session: &mut Session, link: &ArmLink| {
-        let confirmed_ns = is_asked
-            .then(|| session.confirm(AT_START, word))
-            .transpose()?;
-        session.await_hold()?;
+        let confirmed_ns = session.confirm_and_hold(is_asked.then_some((AT_START, word)))?;
         let stage = Stage::begin("stream");
         pipeline::latency(session, link)?;
-        // A simulated arm is in nobody's way.
-        let confirmed = confirmed_ns.unwrap_or_else(now_ns);
-        pipeline::arm_for(session, link, operating_mode, Some(confirmed))?;
+        pipeline::arm_for(session, link, operating_mode, Some(confirmed_ns))?;
         let span = pipeline::execute(session, link, trajectory)?;
         let latency = pipeline::latency(session, link)?;
         stage.done(&format!(
@@ -89,6 +84,9 @@ pub fn run(args: &ThrowArgs) -> Outcome<Option<Value>> {
         .as_deref()
         .map_or(Ok(()), RunFolder::refuse_existing)?;
     let address = reach_measured(&args.arm)?;
+    if let (Some(last), Some(arm)) = (args.plan.as_ref().or(args.again.as_ref()), &address) {
+        Run::check_arm_of_throw(last, arm.simulated).or_input()?;
+    }
     let limits = limits(&args.arm, address.as_ref())?;
     let plan = match (named, &last) {
         (Some(plan), _) => plan,

@@ -39,11 +39,11 @@ impl RunFolder {
         Ok(folder)
     }
 
-    /// Refuses a folder that is there already; results are never mixed.
+    /// Refuses a folder or file that is there already; results are never mixed or replaced.
     pub fn refuse_existing(path: &Path) -> Outcome {
         if path.exists() {
             return Err(bad_input!(
-                "run folder `{}` exists already; name another one with --out",
+                "`{}` exists already; name another with --out",
                 path.display()
             ));
         }

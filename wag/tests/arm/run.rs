@@ -1,7 +1,7 @@
 //! `wag run` with an arm and a camera that it did not start: a rig in another process.
 
-use super::support::{Rig, alone, json_in, refused_in};
-use run_log::files;
+use super::support::{Rig, alone, json_in, moved_in, refused_in};
+use run_log::{Run, files};
 use serde_json::{Value, json};
 use std::fs;
 
@@ -25,10 +25,8 @@ fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_the
     );
     assert!(!here.join("none").exists());
 
-    let done = json_in(
-        here,
-        &format!("run strike {arm} --camera {domain} --keep-films --out run"),
-    );
+    let strike = format!("run strike {arm} --camera {domain} --keep-films");
+    let done = moved_in(here, &strike, "run");
     let missed_m = done["true_tip_target_distance_m"].as_f64().unwrap();
     assert!(missed_m < 0.02, "{missed_m} m");
     assert_eq!(done["command"], "run");
@@ -65,15 +63,16 @@ fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_the
     let domain = format!("{domain}b");
     let rig = Rig::start(&format!("--rope random --seed 31 --camera {domain}"));
     let arm = arm_of(&rig);
-    json_in(here, &format!("wiggle {arm} --camera {domain} --out alone"));
+    let wiggle = format!("wiggle {arm} --camera {domain}");
+    moved_in(here, &wiggle, "alone");
     let tracked = json_in(here, "identify --keypoints alone --out third.toml");
     let third = length_m(&tracked["rope"]);
     assert!((first - third).abs() < 2e-2, "{first} and {third} m");
 
     // Its throw, and what the first run has found is gone on with from every stage.
     let thrown = |from: &str, out: &str| {
-        let line = format!("run {from} {arm} --camera {domain} --out {out}");
-        let done = json_in(here, &line);
+        let line = format!("run {from} {arm} --camera {domain}");
+        let done = moved_in(here, &line, out);
         let missed_m = done["true_tip_target_distance_m"].as_f64().unwrap();
         assert!(missed_m < 0.02, "{line}: {missed_m} m");
         done
@@ -100,19 +99,27 @@ fn a_lob_is_thrown_with_an_arm_and_a_camera_that_are_there_and_judged_as_it_is()
     ));
     let [port, joints, _, rich, _] = rig.ports();
     let folder = tempfile::tempdir().unwrap();
-    let done = json_in(
+    let done = moved_in(
         folder.path(),
         &format!(
-            "run lob --arm 127.0.0.1 --command-port {port} --report-port {joints} --status-port {rich} --camera {domain} --out run"
+            "run lob --arm 127.0.0.1 --command-port {port} --report-port {joints} --status-port {rich} --camera {domain} --keep-films"
         ),
+        "run",
     );
     let [seen, true_] = [&done["camera_verdict"], &done["true_verdict"]];
     assert_eq!(true_["success"], true, "{true_}");
     assert_eq!(seen["success"], true, "{seen} {}", done["score_failed"]);
     assert_eq!(seen["conditions"], true_["conditions"]);
-    // Its distance to a target is not what it was for.
-    let refused = refused_in(folder.path(), 2, "score --run run");
-    assert!(refused.contains("the run of a lob"), "{refused}");
+    // Judged again by its film, it is the same; by another's, nothing is kept.
+    let again = json_in(folder.path(), "score --run run");
+    assert_eq!(&again["camera_verdict"], seen);
+    assert_eq!(&again["replaced_verdict"], seen);
+    let other = "score --run run --video run/wiggle_1344x376.yuyv";
+    refused_in(folder.path(), 1, other);
+    let summary = Run::open(&folder.path().join("run")).unwrap().summary();
+    let kept = summary.unwrap().unwrap();
+    assert_eq!(&kept["score_of_run"], seen);
+    assert_eq!(kept["scored_by"]["target_rgb"], done["target_rgb"]);
 }
 
 /// The wall is put up, the rope thrown over it, filmed, and judged by camera and truth alike.
@@ -120,9 +127,10 @@ fn a_lob_is_thrown_with_an_arm_and_a_camera_that_are_there_and_judged_as_it_is()
 fn a_drape_is_thrown_and_judged_by_the_camera_as_it_is() {
     let _turn = alone();
     let folder = tempfile::tempdir().unwrap();
-    let done = json_in(
+    let done = moved_in(
         folder.path(),
-        "demo --task drape --seed 41 --target 0.74,-0.1,0.28 --out run",
+        "demo --task drape --seed 41 --target 0.74,-0.1,0.28",
+        "run",
     );
     assert_eq!(done["task"], "drape");
     let [seen, true_] = [&done["camera_verdict"], &done["true_verdict"]];

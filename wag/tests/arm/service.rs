@@ -2,7 +2,8 @@
 //! that use them.
 
 use super::support::{
-    Rig, Running, alone, command, json_in, refused_in, send, shared_memory_of, until_moving,
+    Rig, Running, alone, command, json_in, moved_in, refused_in, send, shared_memory_of,
+    until_moving,
 };
 use rustix::process::Signal;
 use std::os::unix::net::UnixDatagram;
@@ -64,8 +65,8 @@ fn a_service_takes_one_command_after_the_other_and_a_stop_is_acknowledged() {
     );
     std::fs::write(here.join("controller.toml"), config).unwrap();
 
-    let on = format!("wiggle --controller {domain} --out");
-    let nobody = refused_in(here, 1, &format!("{on} early"));
+    let on = format!("wiggle --controller {domain}");
+    let nobody = refused_in(here, 1, &format!("{on} --out early"));
     assert!(nobody.contains("no controller runs in domain"), "{nobody}");
     assert!(!here.join("early").exists());
     assert_eq!(shared_memory_of(&domain), Vec::<String>::new());
@@ -73,7 +74,7 @@ fn a_service_takes_one_command_after_the_other_and_a_stop_is_acknowledged() {
     let mut controller = Service::start("rt-controller", here);
     let mut guardian = Service::start("guardian", here);
     for run in ["first", "second"] {
-        let done = json_in(here, &format!("{on} {run}"));
+        let done = moved_in(here, &on, run);
         assert_eq!(done["ok"], true, "{done}");
         let replayed = json_in(here, &format!("replay {run}"));
         assert_eq!(replayed["replay"]["differing_bytes"], 0, "{replayed}");
@@ -85,20 +86,20 @@ fn a_service_takes_one_command_after_the_other_and_a_stop_is_acknowledged() {
     }
 
     // Standard input has ended: that of the next command is its own.
-    let let_go = refused_in(here, 1, &format!("{on} let-go --dead-man"));
+    let let_go = refused_in(here, 1, &format!("{on} --out let-go --dead-man"));
     assert!(let_go.contains("DeadManReleased"), "{let_go}");
-    let broken_off = command(&format!("{on} broken-off --acknowledge"));
+    let broken_off = command(&format!("{on} --out broken-off --acknowledge"));
     let mut broken_off = { broken_off }.current_dir(here).spawn().unwrap();
     // Earlier it would break off the bring-up, and no motion.
     until_moving(&here.join("broken-off"));
     send(broken_off.id(), Signal::INT);
     assert_eq!(broken_off.wait().unwrap().code(), Some(1));
-    let stopped = refused_in(here, 1, &format!("{on} third"));
+    let stopped = refused_in(here, 1, &format!("{on} --out third"));
     assert!(stopped.contains("OperatorStop"), "{stopped}");
     assert!(stopped.contains("--acknowledge"), "{stopped}");
-    let done = json_in(here, &format!("{on} third --acknowledge"));
+    let done = moved_in(here, &format!("{on} --acknowledge"), "third");
     assert_eq!(done["ok"], true, "{done}");
-    let twice = refused_in(here, 2, &format!("{on} fourth --limits limits.toml"));
+    let twice = refused_in(here, 2, &format!("{on} --out fourth --limits limits.toml"));
     assert!(twice.contains("cannot be used with"), "{twice}");
 
     assert_eq!(controller.process.end(Signal::TERM).0, Some(0));

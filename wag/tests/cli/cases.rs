@@ -47,6 +47,7 @@ pub(crate) const MACHINES: &str = "
     identify --keypoints . --out r.toml => camera.toml
     wiggle --calibration no.toml => --camera
     rope new => --out
+    rope new --out rope.toml => rope.toml | exists already
     rope new --out no/r.toml => no/r.toml
     rope new --length 55 --out r.toml => length_m | 10
     rope new --length -1 --out r.toml => length_m

@@ -1,7 +1,7 @@
 //! Processes of a whole demo killed while the arm moves.
 
 use super::shell::{last_flight, recorded};
-use crate::support::{alone, command, ended, has, process_of, send, until};
+use crate::support::{alone, command, ended, has, process_of, send, too_busy, until};
 use rustix::process::Signal;
 use shared_types::ipc::{Bus, ControllerMode, StateReader};
 use shared_types::{FaultCode, OperatingMode, Plan};
@@ -12,12 +12,6 @@ use viewer::live::domain_of_run;
 
 /// Longest wait for a stage of a demo.
 const PATIENCE: Duration = Duration::from_secs(300);
-
-/// What a demo says that gave up because other programs kept the machine busy.
-const TOO_BUSY: [&str; 2] = [
-    "on this machine; stop other programs",
-    "no camera frame arrived",
-];
 
 /// Kills a process of the demo in `run` after some time of its motion; the demo ends with
 /// an error that says so.
@@ -42,9 +36,10 @@ fn demo_in(into: &Path, operating_mode: OperatingMode) -> (Child, PathBuf) {
             return (child, run);
         }
         let said = ended(child, 1);
-        let busy = TOO_BUSY.iter().any(|cause| said.contains(cause));
-        assert!(busy, "it ended before its {operating_mode:?}: {said}");
-        eprintln!("demo {attempt}: {said}");
+        assert!(
+            too_busy(&said),
+            "it ended before its {operating_mode:?}: {said}"
+        );
     }
     panic!("three demos found the machine too busy");
 }

@@ -1,7 +1,9 @@
 //! Killing any process of a demo at a random moment: it is reported within
 //! three seconds, nothing is left running, and the next demo succeeds.
 
-use crate::support::{alone, command, json_in, process_of, processes_of, said, send, until};
+use crate::support::{
+    alone, command, json_in, moved_in, process_of, processes_of, said, send, until,
+};
 use arm_model::Limits;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -95,9 +97,7 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
 
     // The next demo succeeds.
     let run = folder.path().join("after");
-    let output = demo(&run, 1).wait_with_output().unwrap();
-    assert!(output.status.success(), "{}", said(&output));
-    let reported: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let reported = moved_in(folder.path(), "demo --seed 1", &run.display().to_string());
     assert_eq!(reported["ok"], true);
     let distance_m = reported["true_tip_target_distance_m"].as_f64().unwrap();
     assert!(distance_m < 0.02, "{reported:#}");
@@ -141,7 +141,7 @@ fn a_killed_process_is_reported_and_nothing_is_left() {
     // An arm alone would make it, and the same rig does.
     let dry = json_in(folder.path(), "throw --again after --dry-run");
     assert_eq!(dry["ok"], true, "{dry}");
-    let second = json_in(folder.path(), "demo --again after --out second");
+    let second = moved_in(folder.path(), "demo --again after", "second");
     assert_eq!(second["seed"], 1, "{second}");
     assert_eq!(second["target_m"], reported["target_m"]);
     assert_eq!(second["truth"]["rope"], reported["truth"]["rope"]);
@@ -174,7 +174,7 @@ fn score_again(run: &Run, target_m: [f64; 3]) -> ScoreResult {
         video: "film.yuyv".into(),
         camera: "camera.toml".into(),
         tip_rgb: [250, 120, 30],
-        target_rgb: [40, 90, 200],
+        target_rgb: Some([40, 90, 200]),
     };
     let refused = run.keep_score(&elsewhere, &by).unwrap_err().to_string();
     assert!(refused.contains("another throw"), "{refused}");

@@ -11,7 +11,8 @@ use shared_types::ipc::{ControllerMode, CycleRecord};
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
+use std::process::{Child, ChildStdin, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use xarm_sim::SimulatedArm;
 
@@ -154,6 +155,47 @@ fn a_key_that_is_released_brakes_the_arm() {
     });
     was_braked(&arm, child, &run, FaultCode::DeadManReleased);
     drop(key);
+}
+
+/// Holds Enter down until `words` are said.
+fn held_until(child: &mut Child, key: &mut ChildStdin, words: &str) {
+    let over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !over.load(Ordering::Relaxed) && key.write_all(b"\n").is_ok() {
+                std::thread::sleep(Duration::from_millis(50));
+            }
+        });
+        read_until(child, words);
+        over.store(true, Ordering::Relaxed);
+    });
+}
+
+/// What was clear when the word was typed need not be so when Enter is held at last.
+#[test]
+fn a_hold_that_comes_long_after_the_word_is_asked_for_anew() {
+    let _turn = beside_others();
+    let folder = tempfile::tempdir().unwrap();
+    let (arm, run) = (arm(), folder.path().join("run"));
+    let mut child = on_arm(
+        &arm,
+        "wiggle --ask --yes --hold-to-run --operator Ada",
+        &run,
+    )
+    .stdin(Stdio::piped())
+    .spawn()
+    .unwrap();
+    let mut key = child.stdin.take().unwrap();
+    held_until(&mut child, &mut key, "type WIGGLE ");
+    writeln!(key, "WIGGLE").unwrap();
+    std::thread::sleep(Duration::from_millis(9_200));
+    held_until(&mut child, &mut key, "it is asked again");
+    read_until(&mut child, "type WIGGLE ");
+    writeln!(key, "WIGGLE").unwrap();
+    while key.write_all(b"\n").is_ok() {
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    ended(child, 0);
 }
 
 /// What `wag latency` would have written of an arm at this machine's address.

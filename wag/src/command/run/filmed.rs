@@ -9,11 +9,11 @@ use arm_model::JointTrajectory;
 use camera_ingest::process::{RATE_HZ, at_another_rate};
 use cli_output::Stage;
 use planner::arm_response::Following;
-use planner::plan::{Shortcoming, ThrowGoal, judge_seen, shortcoming};
+use planner::plan::{Shortcoming, ThrowGoal, shortcoming};
 use rt_controller::os::now_ns;
-use run_log::{Film, files};
+use run_log::{Film, files, require_same_target};
 use session::Session;
-use shared_types::ipc::message::{CameraEvent, CameraRequest, DominoLook, RigEvent, RigRequest};
+use shared_types::ipc::message::{CameraEvent, CameraRequest, RigEvent, RigRequest};
 use shared_types::{MonotonicNs, OperatingMode, Plan, Task, Verdict};
 use std::time::Duration;
 
@@ -200,7 +200,7 @@ impl Run<'_> {
         let stage = Stage::begin("throw");
         // Empties the histograms, so that they hold this throw alone.
         pipeline::latency(self.session, &self.arm)?;
-        let frames = match self.rests_s() {
+        let frames = match self.goal().and_then(|goal| goal.rests_s()) {
             None => STRIKE_FRAMES,
             Some(rests_s) => {
                 let lasts_s = BEFORE_THROW_S + plan.trajectory.duration_s() + rests_s;
@@ -218,12 +218,6 @@ impl Run<'_> {
     fn goal(&self) -> Option<ThrowGoal> {
         let target_m = self.record.target_m?;
         Some(self.setup.settings.goal(self.record.task, target_m))
-    }
-
-    /// How long the rope of a lob or drape comes to rest after the motion's end (s).
-    fn rests_s(&self) -> Option<f64> {
-        let goal = self.goal().filter(|goal| goal.kind() != Task::Strike)?;
-        Some(goal.task().config().observed_s)
     }
 
     /// Measures by the camera what the throw was for. That it could not
@@ -256,7 +250,9 @@ impl Run<'_> {
             strobe: Some(self.folder.file("throw.png").display().to_string()),
         };
         let score = match self.ask_camera(&request, 60.0, &stage) {
-            Ok(CameraEvent::Scored(score)) => Ok(score),
+            Ok(CameraEvent::Scored(score)) => {
+                require_same_target(score.target_m, plan.target_m).map(|()| score)
+            }
             Ok(other) => Err(anyhow!("the camera process answered with {other:?}")),
             Err(reason) => Err(reason),
         };
@@ -271,45 +267,25 @@ impl Run<'_> {
     fn judge(&mut self, throw: &Film, plan: &Plan, stage: &Stage) -> anyhow::Result<Verdict> {
         let goal = self.goal().context("a throw needs a target")?;
         let cell = self.setup.settings.cell;
-        let domino = goal.task().scene(&cell).domino;
         let request = CameraRequest::Look {
             camera: Box::new(self.setup.camera.clone()),
             tip_rgb: self
                 .record
                 .tip_rgb
                 .context("name the colour of the tip with --tip-rgb")?,
-            domino: domino
-                .zip(self.record.target_rgb)
-                .map(|(domino, rgb)| DominoLook {
-                    rgb,
-                    foot_m: domino.foot_m,
-                    height_m: domino.height_m,
-                }),
-            from_ns: throw.motion.start_ns,
+            domino: self
+                .record
+                .target_rgb
+                .and_then(|rgb| goal.domino_look(&cell, rgb)),
+            span_ns: goal.span_ns(&plan.trajectory, throw.motion.start_ns),
             strobe: Some(self.folder.file("throw.png").display().to_string()),
         };
         match self.ask_camera(&request, 60.0, stage)? {
-            CameraEvent::Seen(mut seen) => {
-                let until_s = plan.trajectory.duration_s() + self.rests_s().unwrap_or_default();
-                ensure!(
-                    seen.end_s > until_s - 0.1,
-                    "the film ends {:.1} s after the throw's begin, the rope must rest until {until_s:.1} s: does the camera send {RATE_HZ} frames a second?",
-                    seen.end_s
-                );
-                seen.tip.retain(|(time_s, _)| *time_s <= until_s);
-                seen.end_s = seen.end_s.min(until_s);
-                let rope = (&plan.rope, self.clamp_m(plan));
-                let judged = judge_seen(&goal, rope, &cell, &seen).map_err(anyhow::Error::msg)?;
-                Ok(judged.verdict)
-            }
+            CameraEvent::Seen(seen) => goal
+                .judge_film((&plan.trajectory, &plan.rope), &cell, &seen)
+                .map_err(anyhow::Error::msg),
             other => bail!("the camera process answered with {other:?}"),
         }
-    }
-
-    /// Where the rope is held after the throw (m).
-    fn clamp_m(&self, plan: &Plan) -> [f64; 3] {
-        let pole = self.setup.settings.cell.pole;
-        pole.attach_pose(&plan.trajectory.end()).0.into()
     }
 
     /// Only now a rig is asked what really happened.
@@ -317,7 +293,8 @@ impl Run<'_> {
         if self.setup.rig.is_none() {
             return Ok(());
         }
-        let rests_s = self.rests_s();
+        let goal = self.goal();
+        let rests_s = goal.as_ref().and_then(ThrowGoal::rests_s);
         let after_s = rests_s.unwrap_or(AFTER_STRIKE_S);
         let to = MonotonicNs(throw.motion.end_ns).plus_s(after_s);
         let request = RigRequest::Truth {
@@ -331,12 +308,11 @@ impl Run<'_> {
             return Ok(());
         };
         let truth = self.session.ask(rig, &request, 10.0, |_| ())?;
-        if let (RigEvent::Truth { rope, seen, .. }, Some(goal), Some(_)) =
-            (&truth, self.goal(), rests_s)
-        {
+        if let (RigEvent::Truth { rope, seen, .. }, Some(goal), Some(_)) = (&truth, goal, rests_s) {
             let cell = &self.setup.settings.cell;
-            let rope = (rope, self.clamp_m(plan));
-            let judged = judge_seen(&goal, rope, cell, seen).map_err(anyhow::Error::msg)?;
+            let judged = goal
+                .judge((&plan.trajectory, rope), cell, seen)
+                .map_err(anyhow::Error::msg)?;
             self.record.set_truth(truth)?;
             self.record.true_verdict = Some(judged.verdict);
             self.record.true_tip_target_distance_m = judged.error_m;

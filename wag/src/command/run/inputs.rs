@@ -15,7 +15,7 @@ use planner::PlannerConfig;
 use planner::plan::{check_reach, clear_of_arm};
 use rig_sim::port_of_rig;
 use run_log::files::{self, read_plan};
-use run_log::{Colours, Run as RecordedRun, confirm};
+use run_log::{Colours, Earlier, Run as RecordedRun, confirm};
 use shared_types::rope::RANGES;
 use shared_types::{StereoCamera, Task};
 use std::path::{Path, PathBuf};
@@ -30,6 +30,8 @@ pub struct Inputs {
     pub names_calibration: bool,
     /// The command port of the simulated rig that films, if one does.
     rig_port: Option<u16>,
+    /// The run that is resumed or corrected.
+    resumed: Option<RecordedRun>,
     pub task: Task,
     pub target_m: Option<[f64; 3]>,
     pub colours: Colours,
@@ -95,36 +97,31 @@ pub fn entry(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Entry> {
         FromStage::Throw => {
             let plan = read_plan(&folder.join(files::PLAN)).or_input()?;
             check_thrown(&plan, accept)?;
-            if let Some(task) = args.task.filter(|task| *task != plan.task) {
-                return Err(bad_input!(
-                    "the plan of `{}` is for a {}, not for a {}",
-                    folder.display(),
-                    plan.task.name(),
-                    task.name()
-                ));
-            }
+            earlier(args)?;
             Entry::Plan(Box::new(plan))
         }
     })
 }
 
-/// What an earlier run tells: what its throw was for, where its target was, and the colours of tip
-/// and target.
-fn earlier(args: &RunArgs) -> Outcome<(Option<Task>, Option<[f64; 3]>, Colours)> {
-    let resumed = resumed(args)?.map(|(_, folder)| folder);
-    let Some(folder) = resumed.or_else(|| args.again.clone()) else {
-        return Ok((None, None, [None; 2]));
+/// The run that is resumed or corrected, and what it tells.
+fn earlier(args: &RunArgs) -> Outcome<(Earlier, Option<RecordedRun>)> {
+    let (stage, folder) = resumed(args)?.unzip();
+    let Some(folder) = folder.or_else(|| args.again.clone()) else {
+        return Ok((Earlier::default(), None));
     };
     let run = RecordedRun::open(&folder).or_input()?;
-    let plan = run.plan().or_input()?;
-    let summary = run.summary().or_input()?.unwrap_or_default();
-    let target_m = serde_json::from_value(summary["target_m"].clone()).ok();
-    let task = serde_json::from_value(summary["task"].clone()).ok();
-    Ok((
-        plan.as_ref().map(|plan| plan.task).or(task),
-        plan.map(|plan| plan.target_m).or(target_m),
-        run.colours().or_input()?,
-    ))
+    let found = run.earlier().or_input()?;
+    if let (Some(FromStage::Throw), Some(thrown), Some(task)) = (stage, found.task, args.task)
+        && thrown != task
+    {
+        return Err(bad_input!(
+            "the plan of `{}` is for a {}, not for a {}: resume it from an earlier stage",
+            folder.display(),
+            thrown.name(),
+            task.name()
+        ));
+    }
+    Ok((found, Some(run)))
 }
 
 fn uncalibrated(domain: Option<&str>) -> Failure {
@@ -175,6 +172,7 @@ impl Inputs {
             colours: [None; 2],
             accept_unconfirmed: false,
             robust: 0,
+            resumed: None,
             keeps_films: args.keep_films,
         })
     }
@@ -189,10 +187,11 @@ impl Inputs {
     pub fn of_run(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Self> {
         let named = args.target.map(|target| target.0);
         named.map_or(Ok(()), |target_m| check_target(target_m, settings))?;
-        let (task, target_m, [tip_rgb, target_rgb]) = earlier(args)?;
+        let (earlier, resumed) = earlier(args)?;
+        let ([tip_rgb, target_rgb], task) = (earlier.colours, earlier.task);
         let found = Self::of_camera(&args.camera, args.out.as_deref())?;
         let of_task = args.task.is_none() || args.task == task;
-        let target_m = named.or(target_m.filter(|_| of_task));
+        let target_m = named.or(earlier.target_m.filter(|_| of_task));
         if target_m.is_none() && found.rig_port.is_none() {
             return Err(bad_input!("name the target with --target X,Y,Z"));
         }
@@ -207,6 +206,7 @@ impl Inputs {
             ],
             accept_unconfirmed: args.accept_unconfirmed,
             robust: args.robust,
+            resumed,
             ..found
         })
     }
@@ -216,8 +216,12 @@ impl Inputs {
         self.rig_port.is_some()
     }
 
-    /// Refuses an arm that the camera does not film, or a controller in another domain.
+    /// Refuses an arm that the camera does not film, a controller in another domain, and a real arm
+    /// for what a rehearsal found.
     pub fn check_arm(&self, address: &ArmAddress) -> Outcome {
+        if let Some(run) = &self.resumed {
+            run.check_arm(address.simulated).or_input()?;
+        }
         if let Some(port) = self.rig_port {
             if !address.simulated {
                 return Err(bad_input!(

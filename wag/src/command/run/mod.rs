@@ -208,11 +208,6 @@ fn on_camera(
         ));
     }
     let operator = operator(arm, &address)?;
-    if asks(arm, &address) && inputs.task != Task::Strike {
-        eprintln!(
-            "Board or wall of an earlier throw must be away: no move and no wiggle goes around it."
-        );
-    }
     require_clear_area(arm, &address, "MOVE")?;
     watch_interrupts().or_failed()?;
     let mut folder = RunFolder::create(out, name)?;
@@ -224,6 +219,7 @@ fn on_camera(
     let goal = (inputs.task, inputs.target_m);
     let mut record = RunRecord::new(name, seed, goal, &folder.path);
     record.operator = operator;
+    record.simulated = address.simulated;
     let done = |session: &mut Session, record: &mut RunRecord| {
         let stage = Stage::begin("start");
         watch_operator(session, arm, &address)?;

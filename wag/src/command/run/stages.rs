@@ -13,7 +13,6 @@ use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::service::{PlannerRequest, PlannerRpc};
 use planner::wiggle::wiggle;
-use rt_controller::os::now_ns;
 use run_log::{Film, RunRecord, files};
 use session::Session;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRpc, RopeAppearance};
@@ -235,14 +234,8 @@ impl<'a> Run<'a> {
     /// Arms for a wiggle or a throw, which the operator confirms where somebody must.
     pub(super) fn arm_for(&mut self, operating_mode: OperatingMode) -> anyhow::Result<()> {
         let word = motion::words(operating_mode).1;
-        let asked = self
-            .setup
-            .asks
-            .then(|| self.session.confirm(AT_START, word));
-        let confirmed_ns = asked.transpose()?;
-        self.session.await_hold()?;
-        // A simulated arm is in nobody's way.
-        let confirmed_ns = confirmed_ns.unwrap_or_else(now_ns);
+        let asked = self.setup.asks.then_some((AT_START, word));
+        let confirmed_ns = self.session.confirm_and_hold(asked)?;
         pipeline::arm_for(self.session, &self.arm, operating_mode, Some(confirmed_ns))
     }
 
