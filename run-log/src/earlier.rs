@@ -3,7 +3,7 @@
 use crate::{Colours, Run, files, ledger};
 use anyhow::{Context, Result, ensure};
 use shared_types::Task;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// As far as it is known.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -31,6 +31,27 @@ impl Run {
             target_m: plan.map(|plan| plan.target_m).or(target_m),
             colours: self.colours()?,
         })
+    }
+
+    /// The file of its rope.
+    ///
+    /// # Errors
+    /// It identified none, and says where to resume it instead.
+    pub fn rope_file(&self) -> Result<PathBuf> {
+        let file = self.folder().join(files::ROPE);
+        ensure!(
+            file.is_file(),
+            "`{}` is not there: a run that identified no rope is resumed with --from identify, one \
+             that was itself resumed from the run before it",
+            file.display()
+        );
+        Ok(file)
+    }
+
+    /// What its planner was told; none where a planner was there already.
+    #[must_use]
+    pub fn planner_file(&self) -> Option<PathBuf> {
+        Some(self.folder().join(files::PLANNER)).filter(|file| file.is_file())
     }
 
     /// Whether its arm was simulated, by its summary or, where it has none or is of an older

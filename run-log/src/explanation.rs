@@ -85,8 +85,8 @@ pub struct Stop {
     pub reaction: &'static str,
     /// Whether the arm itself was asked to stop.
     pub arm_asked_to_stop: bool,
-    /// Time from the cause to the end of setpoints (s).
-    pub rest_after_s: f64,
+    /// Time from the cause to setpoints at rest (s); none where they ended before.
+    pub rest_after_s: Option<f64>,
     /// Which limit.
     pub limit_exceeded: Option<LimitExceeded>,
     /// The setpoint that was sent latest in the second before.
@@ -172,7 +172,8 @@ fn stop(log: &RunLog, cause: &CauseRecord) -> Stop {
         motion_s: Some(cause.trajectory_s).filter(|t| *t >= 0.0),
         reaction: reaction(cause.path),
         arm_asked_to_stop: cause.stop_arm != 0,
-        rest_after_s: log.time_s(rest_ns) - log.time_s(cause.stamp_ns),
+        rest_after_s: (cause.path < SETPOINTS_ENDED)
+            .then(|| log.time_s(rest_ns) - log.time_s(cause.stamp_ns)),
         limit_exceeded: limit_exceeded(cause),
         latest_setpoint: latest_setpoint(log, cause.stamp_ns),
         counts: cause.counts,
@@ -200,6 +201,9 @@ fn arm_error(log: &RunLog, cause: &CauseRecord) -> u8 {
         .find_map(|m| m.arm_error)
         .unwrap_or(0)
 }
+
+/// The stop path from which setpoints end at once.
+const SETPOINTS_ENDED: u8 = 3;
 
 const fn reaction(path: u8) -> &'static str {
     match path {
@@ -394,7 +398,7 @@ mod tests {
         let exceeded = stop.limit_exceeded.as_ref().unwrap();
         assert_eq!((exceeded.joint, exceeded.unit), (Some(4), "rad"));
         assert_eq!(stop.arm_error, 31, "said 160 ms after the stop");
-        assert!((stop.rest_after_s - 0.096).abs() < 1e-9);
+        assert!((stop.rest_after_s.unwrap() - 0.096).abs() < 1e-9);
         assert!((stop.time_s - 1.196).abs() < 1e-9);
         assert!(!stop.remedy.is_empty());
         // Every cycle from a second before to a second after is in one row.

@@ -53,8 +53,12 @@ fn show_stop(page: &mut String, stop: &Stop) {
     } else {
         ""
     };
-    let (reaction, rest_ms) = (stop.reaction, 1e3 * stop.rest_after_s);
-    let reaction = format!("{reaction}{requested}; at rest after {rest_ms:.0} ms");
+    let rest = match stop.rest_after_s {
+        Some(s) => format!("; at rest after {:.0} ms", 1e3 * s),
+        None if stop.mode.is_moving() => "; when the arm came to rest is not known".to_owned(),
+        None => String::new(),
+    };
+    let reaction = format!("{}{requested}{rest}", stop.reaction);
     let while_stopping = |code: FaultCode| format!("{code:?}: {}", code.explain());
     let warned = (stop.arm_warning != 0).then(|| format!("W{}", stop.arm_warning));
     let lines = [

@@ -81,17 +81,6 @@ pub struct Kept<T> {
     pub warnings: Vec<String>,
 }
 
-impl<T> Kept<T> {
-    fn contradicts(mut self, what: &str) -> Self {
-        self.warnings.push(format!(
-            "it contradicts the {what} that it replaces: look at the film and the colours; without \
-             --tip-rgb and --target-rgb, `wag score --run {}` takes the run's own",
-            self.folder.display()
-        ));
-        self
-    }
-}
-
 impl<T> fmt::Display for Kept<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let folder = self.folder.display();
@@ -109,8 +98,11 @@ fn contradict(one: &ScoreResult, other: &ScoreResult) -> bool {
     a_low > b_high || b_low > a_high
 }
 
-/// Whether two verdicts disagree about a condition.
+/// Whether two verdicts disagree about a condition, or one saw what the other did not.
 fn disagree(one: &Verdict, other: &Verdict) -> bool {
+    if one.unseen != other.unseen {
+        return true;
+    }
     let mut pairs = one
         .conditions
         .iter()
@@ -186,13 +178,10 @@ impl Run {
                 .entry("stereo_tip_target_distance_m")
                 .and_modify(|m| *m = score.closest_m.into());
         }
-        let mut kept = self.keep(summary, ("score", score), by)?;
-        if let Some(replaced) = kept.replaced {
-            kept.replaced_words = Some(format!("{:.1} mm", 1e3 * replaced.closest_m));
-            if contradict(&replaced, score) {
-                kept = kept.contradicts("score");
-            }
-        }
+        let contradicts = |own: &ScoreResult| contradict(own, score);
+        let mut kept = self.keep(summary, ("score", score), by, contradicts)?;
+        let replaced = kept.replaced.map(|replaced| 1e3 * replaced.closest_m);
+        kept.replaced_words = replaced.map(|mm| format!("{mm:.1} mm"));
         if let Err(why) = self.miss_m() {
             kept.warnings.push(format!("{why:#}"));
         }
@@ -205,14 +194,9 @@ impl Run {
     /// As [`Self::summary_of_throw`].
     pub fn keep_verdict(&self, verdict: &Verdict, by: &ScoredBy) -> Result<Kept<Verdict>> {
         let summary = self.summary_of_throw()?;
-        let mut kept = self.keep(summary, ("camera_verdict", verdict), by)?;
-        let disagrees = kept.replaced.as_ref().map(|replaced| {
-            kept.replaced_words = Some(format!("`{replaced}`"));
-            disagree(replaced, verdict)
-        });
-        if disagrees == Some(true) {
-            kept = kept.contradicts("verdict");
-        }
+        let contradicts = |own: &Verdict| disagree(own, verdict);
+        let mut kept = self.keep(summary, ("camera_verdict", verdict), by, contradicts)?;
+        kept.replaced_words = kept.replaced.as_ref().map(|old| format!("`{old}`"));
         Ok(kept)
     }
 
@@ -221,6 +205,7 @@ impl Run {
         mut summary: Value,
         (key, value): (&str, &T),
         by: &ScoredBy,
+        contradicts: impl Fn(&T) -> bool,
     ) -> Result<Kept<T>> {
         let before = summary[key].take();
         let replaced = serde_json::from_value(before.clone()).ok();
@@ -229,7 +214,17 @@ impl Run {
             summary[SCORE_OF_RUN] = if before.is_null() { failed } else { before };
         }
         summary[key] = serde_json::to_value(value)?;
+        let own: Option<T> = serde_json::from_value(summary[SCORE_OF_RUN].clone()).ok();
+        let mut warnings = Vec::new();
+        if own.is_some_and(|own| contradicts(&own)) {
+            warnings.push(format!(
+                "it contradicts what the run itself measured: look at the film and the colours; \
+                 without --tip-rgb and --target-rgb, `wag score --run {}` takes the run's own",
+                self.folder().display()
+            ));
+        }
         summary[SCORED_BY] = serde_json::to_value(by)?;
+        summary[SCORED_BY]["warnings"] = serde_json::to_value(&warnings)?;
         if let Some(figures) = summary.as_object_mut() {
             figures.remove("score_failed");
         }
@@ -238,7 +233,7 @@ impl Run {
             folder: self.folder().to_owned(),
             replaced,
             replaced_words: None,
-            warnings: Vec::new(),
+            warnings,
         })
     }
 

@@ -28,7 +28,7 @@ impl Run {
         let path = self.folder().join(files::KEYPOINTS);
         let name = path.display();
         let track = files::read_text(&path).with_context(|| {
-            format!("`{name}`: a rope can be identified again from a run whose film was tracked")
+            format!("`{name}`: a rope is identified again from a run whose film was tracked; `wag track --video RUN --camera RUN/camera.toml --out {name}` tracks it")
         })?;
         let track: KeypointTrack =
             serde_json::from_str(&track).with_context(|| format!("keypoints `{name}`"))?;

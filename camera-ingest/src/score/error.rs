@@ -15,7 +15,7 @@ pub enum ScoreError {
     /// Not found in enough frames.
     #[error(
         "score: the {what} was detected in both images of {seen} frames, at least {least} are needed; \
-         check its colour and the light"
+         check its colour, the light, and that this is the film of the throw"
     )]
     NotSeen {
         /// `tip` or `target`.

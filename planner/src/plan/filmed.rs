@@ -67,7 +67,7 @@ impl ThrowGoal {
         let until_s = self.observed_s(motion);
         if seen.end_s <= until_s - ENDS_EARLY_S {
             return Err(format!(
-                "the film ends {:.1} s after the throw's begin, the rope must rest until {until_s:.1} s: is it this throw's film, and was it recorded at the rate of the camera's mode?",
+                "the film ends {:.1} s after the throw's begin, the rope must rest until {until_s:.1} s: is it this throw's film with its own CSV of times, and was it recorded at the rate of the camera's mode?",
                 seen.end_s
             ));
         }

@@ -70,7 +70,8 @@ function film() {
 
 function rest() {
   const s = data.summary || {};
-  byId("warnings").replaceChildren(...(Array.isArray(s.warnings) ? s.warnings : []).map((w) => make("li", {}, "warning: " + w)));
+  const list = (of) => (of && Array.isArray(of.warnings) ? of.warnings : []);
+  byId("warnings").replaceChildren(...[...list(s), ...list(s.scored_by)].map((w) => make("li", {}, "warning: " + w)));
   byId("missing").replaceChildren(...data.missing.map((m) => make("li", {}, "not in this run: " + m)));
   byId("summary").textContent = JSON.stringify(s, null, 2);
 }

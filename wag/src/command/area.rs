@@ -200,7 +200,7 @@ pub fn require_clear_area(arm: &ArmArgs, address: &ArmAddress, word: &str) -> Ou
         ))
     };
     if !can_ask(stdin().is_terminal(), output::is_json()) {
-        return refuse("add --yes");
+        return refuse("add --yes, or type the word at a terminal, without --json");
     }
     print!(
         "The arm will be enabled and move to its start. Emergency stop in reach, nobody within reach of arm and rope?\n\

@@ -49,9 +49,8 @@ fn judged(
     (by, camera): (ScoredBy, &StereoCamera),
 ) -> Outcome<Value> {
     let cell = config::cell_of(run).or_input()?;
-    let kept = run.folder().join(files::PLANNER);
-    let kept = kept.is_file().then_some(kept.as_path());
-    let settings: PlannerConfig = config::here(kept).or_input()?;
+    let kept = run.planner_file();
+    let settings: PlannerConfig = config::here(kept.as_deref()).or_input()?;
     let goal = settings.goal(plan.task, plan.target_m);
     let domino = by.target_rgb.and_then(|rgb| goal.domino_look(&cell, rgb));
     let span_ns = goal.span_ns(&plan.trajectory, run.throw_began_ns().or_input()?);

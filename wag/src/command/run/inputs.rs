@@ -89,7 +89,8 @@ pub fn entry(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Entry> {
             Entry::Rope(Box::new(KnownRope::identified(estimate, unconfirmed)))
         }
         FromStage::Plan => {
-            let known = KnownRope::read(&folder.join(files::ROPE)).or_input()?;
+            let run = RecordedRun::open(&folder).or_input()?;
+            let known = KnownRope::read(&run.rope_file().or_input()?).or_input()?;
             confirm(&known.unconfirmed, accept, LOOK).or_failed()?;
             known.ensemble(args.robust, args.seed).or_input()?;
             Entry::Rope(Box::new(known))

@@ -262,7 +262,7 @@ impl Run<'_> {
         }
         self.record.settle = Some(settled);
         self.record.stages.settle_s = stage.done(&format!(
-            "swing {:.1} cm -> {:.1} cm",
+            "swing {:.1} cm -> {:.1} cm, as simulated",
             100.0 * settled.plain_residual_m,
             100.0 * settled.residual_m
         ));
