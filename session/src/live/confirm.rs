@@ -142,8 +142,8 @@ impl Session {
             }
             self.end_hold();
             self.confirmed.pop();
-            output::remark(format_args!(
-                "The hold came more than {BEGINS_WITHIN_S:.0} s after {word}: nothing moved, it is asked again"
+            output::aside(format_args!(
+                "The hold came more than {BEGINS_WITHIN_S:.0} s after {word}: nothing moved, it is asked again\n"
             ));
         }
     }

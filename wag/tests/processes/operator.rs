@@ -169,6 +169,8 @@ fn held_until(child: &mut Child, key: &mut ChildStdin, words: &str) {
         read_until(child, words);
         over.store(true, Ordering::Relaxed);
     });
+    // For less than this a key counts as held that is released.
+    std::thread::sleep(Duration::from_millis(400));
 }
 
 /// What was clear when the word was typed need not be so when Enter is held at last.
