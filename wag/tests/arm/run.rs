@@ -115,10 +115,11 @@ fn a_lob_is_thrown_with_an_arm_and_a_camera_that_are_there_and_judged_as_it_is()
     assert_eq!(&again["camera_verdict"], seen);
     assert_eq!(&again["replaced_verdict"], seen);
     let other = "score --run run --video run/wiggle_1344x376.yuyv";
-    refused_in(folder.path(), 1, other);
+    let refused = refused_in(folder.path(), 1, other);
+    assert!(refused.contains("is it this throw's film"), "{refused}");
     let summary = Run::open(&folder.path().join("run")).unwrap().summary();
     let kept = summary.unwrap().unwrap();
-    assert_eq!(&kept["score_of_run"], seen);
+    assert_eq!([&kept["camera_verdict"], &kept["score_of_run"]], [seen; 2]);
     assert_eq!(kept["scored_by"]["target_rgb"], done["target_rgb"]);
 }
 
