@@ -8,10 +8,14 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 mod mujoco;
+mod shard;
+mod submit;
 
 pub use mujoco::{
     ChannelName, ContactDynamicsArgs, MujocoArgs, OtherRealityArgs, RopeAccuracyArgs,
 };
+pub use shard::Shard;
+pub use submit::{MergeArgs, SubmitArgs};
 
 /// Reproduce a result of the paper, or measure how fast this machine runs a part of the
 /// system, on simulated ropes.
@@ -45,6 +49,10 @@ pub enum Command {
     /// Figures of README and book: make them, write them into the documents, check these.
     #[command(subcommand)]
     Figures(FiguresCommand),
+    /// Join the shards of a study.
+    Merge(MergeArgs),
+    /// Make a study in many processes: start its shards, watch them, try again, merge.
+    Submit(SubmitArgs),
     /// A result of the paper.
     #[command(flatten)]
     Result(ResultCommand),
@@ -148,6 +156,10 @@ pub struct ResultArgs {
     /// (SVG) is drawn next to it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Make a part of the trials only, 2/8 for the second of eight; `experiments merge` joins
+    /// them.
+    #[arg(long, value_name = "I/N", requires = "out", default_value_t = Shard::WHOLE, hide_default_value = true)]
+    pub shard: Shard,
 }
 
 /// Which films, and how many at once.

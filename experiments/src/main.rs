@@ -19,6 +19,7 @@ mod program;
 mod report;
 mod results;
 mod rooms;
+mod submit;
 
 use std::process::ExitCode;
 
@@ -33,6 +34,8 @@ fn main() -> ExitCode {
         args::Command::Figures(command) => figures::run(command),
         args::Command::Rooms(args) => rooms::run(args),
         args::Command::TrackRooms(args) => rooms::track::run(args),
+        args::Command::Merge(args) => results::merge(args),
+        args::Command::Submit(args) => submit::run(args),
         args::Command::Result(result) => results::run(result),
     };
     cli_output::finish(outcome)

@@ -230,6 +230,7 @@ impl Batch<'_> {
                 rope: candidate.rope,
                 path,
                 start,
+                point_m: candidate.point_m,
             });
         }
         let is_alone = self.scene.is_empty() && members.iter().all(|m| m.rope.extras.is_none());

@@ -37,13 +37,15 @@ impl FrameTimes {
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeTrack {
     nodes: usize,
-    numbers: Numbers,
+    numbers: NodeNumbers,
 }
 
-/// Stored in the precision they were computed in.
+/// Numbers of a [`NodeTrack`] in C order, in the precision they were computed in.
 #[derive(Debug, Clone, PartialEq)]
-enum Numbers {
+pub enum NodeNumbers {
+    /// Single precision.
     F32(Vec<f32>),
+    /// Double precision.
     F64(Vec<f64>),
 }
 
@@ -51,9 +53,9 @@ impl NodeTrack {
     pub(crate) fn zeros(frames: usize, nodes: usize, single: bool) -> Self {
         let count = frames * nodes * 3;
         let numbers = if single {
-            Numbers::F32(vec![0.0; count])
+            NodeNumbers::F32(vec![0.0; count])
         } else {
-            Numbers::F64(vec![0.0; count])
+            NodeNumbers::F64(vec![0.0; count])
         };
         Self { nodes, numbers }
     }
@@ -62,8 +64,8 @@ impl NodeTrack {
     #[must_use]
     pub fn frames(&self) -> usize {
         let count = match &self.numbers {
-            Numbers::F32(v) => v.len(),
-            Numbers::F64(v) => v.len(),
+            NodeNumbers::F32(v) => v.len(),
+            NodeNumbers::F64(v) => v.len(),
         };
         count / (self.nodes * 3)
     }
@@ -83,8 +85,8 @@ impl NodeTrack {
         assert!(node < self.nodes, "node {node} of {}", self.nodes);
         let at = (frame * self.nodes + node) * 3;
         match &self.numbers {
-            Numbers::F32(v) => Vector3::new(v[at].into(), v[at + 1].into(), v[at + 2].into()),
-            Numbers::F64(v) => Vector3::new(v[at], v[at + 1], v[at + 2]),
+            NodeNumbers::F32(v) => Vector3::new(v[at].into(), v[at + 1].into(), v[at + 2].into()),
+            NodeNumbers::F64(v) => Vector3::new(v[at], v[at + 1], v[at + 2]),
         }
     }
 
@@ -92,9 +94,15 @@ impl NodeTrack {
     #[must_use]
     pub fn to_f64(&self) -> Vec<f64> {
         match &self.numbers {
-            Numbers::F32(v) => v.iter().map(|x| f64::from(*x)).collect(),
-            Numbers::F64(v) => v.clone(),
+            NodeNumbers::F32(v) => v.iter().map(|x| f64::from(*x)).collect(),
+            NodeNumbers::F64(v) => v.clone(),
         }
+    }
+
+    /// All numbers in C order, without a copy.
+    #[must_use]
+    pub fn into_numbers(self) -> NodeNumbers {
+        self.numbers
     }
 
     /// Shape as (frames, nodes, 3).
@@ -108,12 +116,12 @@ impl NodeTrack {
     fn put<V: Lanes>(&mut self, frame: usize, lane: usize, positions: &[Vec3<V>]) {
         let range = frame * self.nodes * 3..(frame + 1) * self.nodes * 3;
         match &mut self.numbers {
-            Numbers::F32(v) => {
+            NodeNumbers::F32(v) => {
                 for (out, x) in v[range].chunks_exact_mut(3).zip(positions) {
                     out.copy_from_slice(&x.get(lane).map(|x| x as f32));
                 }
             }
-            Numbers::F64(v) => {
+            NodeNumbers::F64(v) => {
                 for (out, x) in v[range].chunks_exact_mut(3).zip(positions) {
                     out.copy_from_slice(&x.get(lane));
                 }
@@ -126,8 +134,8 @@ impl NodeTrack {
     pub(crate) fn hold_last_finite(&mut self) {
         let per_frame = self.nodes * 3;
         match &mut self.numbers {
-            Numbers::F32(v) => hold_last_finite(v, per_frame),
-            Numbers::F64(v) => hold_last_finite(v, per_frame),
+            NodeNumbers::F32(v) => hold_last_finite(v, per_frame),
+            NodeNumbers::F64(v) => hold_last_finite(v, per_frame),
         }
     }
 }

@@ -29,6 +29,8 @@ pub(crate) struct Member<'a> {
     pub(crate) rope: &'a RopeParams,
     pub(crate) path: &'a BasePath,
     pub(crate) start: StartState,
+    /// Point that its lead is to come near to, if it has one of its own (m, world).
+    pub(crate) point_m: Option<[f64; 3]>,
 }
 
 /// The work of one group; at most as many members as the kernel has lanes, all with
@@ -63,12 +65,13 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
         let ropes: Vec<&RopeParams> = self.members.iter().map(|m| m.rope).collect();
         let mut clock = Clock::new(&paths, &ropes, self.watch.origin_m());
         let mut recorder = FrameRecorder::new(self.frames, &clock, n, self.single_precision);
+        let points: Vec<_> = self.members.iter().map(|m| m.point_m).collect();
         let start = clock.base();
         let [hanging, swinging] = tip_from_clamp(&links, rope.link_length);
         let mut watcher = Watcher::new(
             &self.watch,
             [start.position.add(hanging), start.velocity.add(swinging)],
-            count,
+            &points,
             self.horizon_s,
         );
         let mut health = Health::<V>::new(count);
@@ -258,6 +261,7 @@ mod tests {
             rope,
             path,
             start: StartState::at_rest(vec![[1.0, 0.0, 0.0, 0.0]; rope.links as usize]),
+            point_m: None,
         });
         kernel.run(GroupTask::<true> {
             scene: &Scene::EMPTY,

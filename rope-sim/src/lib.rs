@@ -51,7 +51,7 @@ mod watch;
 
 pub use batch::{roll_out, roll_out_in, roll_out_in_with};
 pub use error::SimulateError;
-pub use frames::{FrameTimes, NodeTrack};
+pub use frames::{FrameTimes, NodeNumbers, NodeTrack};
 pub use kernel::GRAVITY_M_S2;
 pub use lanes::{Kernel, Precision};
 pub use live::LiveRope;

@@ -68,6 +68,9 @@ pub struct Candidate<'a> {
     pub motion: &'a dyn AttachMotion,
     /// How it swings at the start, which must be [`Start::Equilibrium`].
     pub sway: Sway,
+    /// Point that its lead's closest approach to is measured (m, world); without one
+    /// [`Watch::point_m`], which also says where positions are resolved best.
+    pub point_m: Option<[f64; 3]>,
 }
 
 /// Swing left in a rope when a motion begins: its first mode in two planes, about. The rope
@@ -96,6 +99,7 @@ impl<'a> Candidate<'a> {
             rope,
             motion,
             sway: Sway::NONE,
+            point_m: None,
         }
     }
 
@@ -103,6 +107,15 @@ impl<'a> Candidate<'a> {
     #[must_use]
     pub fn with_sway(self, sway: Sway) -> Self {
         Self { sway, ..self }
+    }
+
+    /// The same, watching a point of its own (m, world) in the place of [`Watch::point_m`].
+    #[must_use]
+    pub fn watching(self, point_m: [f64; 3]) -> Self {
+        Self {
+            point_m: Some(point_m),
+            ..self
+        }
     }
 }
 
@@ -156,6 +169,8 @@ pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<()
         let sway = candidate.sway;
         let numbers = [sway.angle_rad, sway.rate_rad_s].concat();
         refuse_unless_finite("sway", numbers).map_err(|e| SimulateError::of(index, e))?;
+        refuse_unless_finite("point_m", candidate.point_m.into_iter().flatten())
+            .map_err(|e| SimulateError::of(index, e))?;
         if sway != Sway::NONE && options.start != Start::Equilibrium {
             let reason = "it swings at the start, but is to start straight; give it one start";
             return Err(SimulateError::of(index, reason));

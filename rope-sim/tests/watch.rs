@@ -5,7 +5,10 @@
 mod support;
 
 use nalgebra::{Rotation2, Vector2, Vector3};
-use rope_sim::{AttachMotion, BoxRegion, FrameTimes, Precision, Rollout, Scene, SimOptions, Watch};
+use rope_sim::{
+    AttachMotion, BoxRegion, Candidate, FrameTimes, Precision, Rollout, Scene, SimOptions, Watch,
+    roll_out,
+};
 use shared_types::RopeParams;
 use support::{pendulum, released, rope, throw, tips, world};
 
@@ -216,6 +219,41 @@ fn a_pendulum_does_what_its_formulas_say() {
         (dwell.total_s - inside_s).abs() < 5e-5,
         "{dwell:?} {inside_s}"
     );
+}
+
+/// A candidate's own point counts before that of all, and is measured as that would be.
+#[test]
+fn each_candidate_may_watch_a_point_of_its_own() {
+    let (rope, arm) = (rope(), throw(0.0));
+    let of_all = |point_m| SimOptions {
+        watch: Watch::point(point_m),
+        ..options(5e-4, 0.01)
+    };
+    let nowhere = options(5e-4, 0.01);
+    let nowhere = SimOptions {
+        watch: Watch::NOTHING,
+        ..nowhere
+    };
+    let one = Candidate::new(&rope, &arm);
+    let other_m = POINT.map(|x| x + 0.2);
+    let candidates = [one.watching(other_m), one, one.watching(POINT)];
+    for options in [of_all(POINT), nowhere] {
+        let found = roll_out(&candidates, &options).unwrap();
+        let near = |point_m| {
+            simulate(&rope, &arm, &of_all(point_m))
+                .watched
+                .to_point
+                .unwrap()
+        };
+        let [own, of_all, same] = [0, 1, 2].map(|i| found[i].watched.to_point);
+        assert!((own.unwrap().distance_m - near(other_m).distance_m).abs() < 1e-9);
+        assert!((same.unwrap().distance_m - near(POINT).distance_m).abs() < 1e-9);
+        assert_eq!(of_all.is_some(), options.watch.point_m.is_some());
+        assert_eq!(found[0].nodes, found[1].nodes);
+    }
+    let nan = [one.watching([f64::NAN; 3])];
+    let refusal = roll_out(&nan, &nowhere).unwrap_err().to_string();
+    assert!(refusal.contains("point_m"), "{refusal}");
 }
 
 #[test]

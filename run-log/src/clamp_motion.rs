@@ -81,7 +81,7 @@ impl ClampMotion {
     ///
     /// # Errors
     /// Times or numbers that make no motion, a file of poses that cannot be read.
-    pub fn attach(&self) -> Result<Box<dyn AttachMotion>> {
+    pub fn attach(&self) -> Result<Box<dyn AttachMotion + Send>> {
         let file = || format!("`{}`", self.path.display());
         if let Some(csv) = &self.joints {
             let times_s: Vec<f64> = csv.times_s.iter().map(|t| t + self.late_s).collect();

@@ -1,10 +1,9 @@
 //! What every result shares: set-up, trials that survive an interruption, report.
 
-use super::checkpoint::Checkpoint;
+use super::checkpoint::{Checkpoint, Origin};
 use super::picture::{self, Curve};
 use crate::args::ResultArgs;
 use crate::network::with_network;
-use crate::program::program;
 use crate::report::{Column, joined, print_table};
 use cli_output::{OrInput, Outcome, Stage, interrupted};
 use experiments::trials::{Trial, TrialRig, run as identify_all};
@@ -107,25 +106,30 @@ impl<'a> Experiment<'a> {
         }
     }
 
-    /// Makes the trials of a sequence, or goes on with those of an earlier run.
+    /// Makes the trials of a sequence, or goes on with those of an earlier run; none where only a
+    /// shard of them was asked for, which is made then.
     pub fn trials<T: Serialize + DeserializeOwned>(
         &self,
         sequence: Sequence<T>,
         make: impl Fn(&[u64]) -> anyhow::Result<Vec<T>>,
-    ) -> Outcome<Vec<T>> {
-        let out = self.args.out.as_deref();
-        let count = sequence.count;
+    ) -> Outcome<Option<Vec<T>>> {
+        let (out, shard) = (self.args.out.as_deref(), self.args.shard);
+        let count = shard.len(sequence.count);
+        let (name, seed, method) = (self.name, self.args.seed, sequence.method);
         let empty = Checkpoint {
-            name: self.name.to_owned(),
-            program: program().or_failed()?,
-            seed: self.args.seed,
-            method: sequence.method,
+            origin: Origin::here(name, seed, method, sequence.count).or_failed()?,
+            shard,
             trials: Vec::new(),
         };
         let mut checkpoint = Checkpoint::open(out, empty).or_input()?;
         let trials = &mut checkpoint.trials;
         trials.truncate(usize::try_from(count).unwrap_or(usize::MAX));
-        let missing: Vec<u64> = (trials.len() as u64..count).collect();
+        let missing = (trials.len() as u64..count).map(|place| shard.trial(place));
+        let missing: Vec<u64> = missing.collect();
+        if count == 0 {
+            // A shard of nothing is finished when its file is there.
+            checkpoint.write(out).or_failed()?;
+        }
         for batch in missing.chunks(sequence.per_thread * self.options.threads.max(1)) {
             checkpoint.trials.extend(make(batch).or_failed()?);
             checkpoint.write(out).or_failed()?;
@@ -141,7 +145,7 @@ impl<'a> Experiment<'a> {
                 return Err(failed!("interrupted after {done} of {count} ropes{how}"));
             }
         }
-        Ok(checkpoint.trials)
+        Ok(shard.is_whole().then_some(checkpoint.trials))
     }
 
     /// Films and identifies as many ropes as are asked for, times `factor`.
@@ -149,7 +153,7 @@ impl<'a> Experiment<'a> {
         &self,
         factor: u64,
         rope: impl Fn(u64) -> RopeParams + Sync,
-    ) -> Outcome<Vec<Trial>> {
+    ) -> Outcome<Option<Vec<Trial>>> {
         let figure = |t: &Trial| t.residual_px;
         let requested = self.sequence(IDENTIFIED, 8, (figure, "ropes, residual px"));
         let sequence = Sequence {
@@ -191,6 +195,22 @@ impl<'a> Experiment<'a> {
         self.finish(&format!("{ropes} ropes"), picture, own, || {
             print_table(&rows, 1, table);
         })
+    }
+
+    /// Ends the run of a shard.
+    pub fn finish_shard(self) -> Outcome<Option<Value>> {
+        let shard = self.args.shard;
+        let seconds = self.stage.done(&format!("shard {shard}"));
+        if let Some(out) = &self.args.out {
+            println!(
+                "shard {shard} in `{}`; `experiments merge` joins it with the others",
+                out.display()
+            );
+        }
+        Ok(Some(json!({
+            "ok": true, "command": self.name, "version": shared_types::VERSION,
+            "seed": self.args.seed, "shard": shard, "seconds": seconds, "out": self.args.out,
+        })))
     }
 
     /// Ends the run: prints its tables and returns what `--json` prints:

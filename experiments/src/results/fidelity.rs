@@ -235,6 +235,11 @@ fn throw(config: &PlannerConfig, seed: u64) -> anyhow::Result<JointTrajectory> {
 
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let args = experiment.args;
+    if !args.shard.is_whole() {
+        return Err(bad_input!(
+            "motion-fidelity has ten ropes and no shards: leave out --shard"
+        ));
+    }
     let ropes = toml::from_str::<FidelityConfig>(ROPES)
         .and_then(|config| config.ropes())
         .context("the built-in `configs/planner/fidelity.toml` is damaged")

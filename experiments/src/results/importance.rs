@@ -145,7 +145,10 @@ fn rows(trials: &[ImportanceTrial]) -> (Vec<Row>, Vec<Curve>) {
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let figure = |t: &ImportanceTrial| 100.0 * t.identified_m;
     let sequence = experiment.sequence(ROPES, 1, (figure, "ropes, cm identified"));
-    let trials = strike_trials(&experiment, sequence, ImportanceTrial::of)?;
+    let made = strike_trials(&experiment, sequence, ImportanceTrial::of)?;
+    let Some(trials) = made else {
+        return experiment.finish_shard();
+    };
     let axis = "distance of tip and target (cm); dashed: the paper's mean";
     experiment.finish_rows(trials.len(), rows(&trials), axis, TABLE)
 }

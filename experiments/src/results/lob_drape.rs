@@ -209,9 +209,12 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     };
     let sequence = experiment.sequence(ROPES, 1, (figure, "ropes, cm of the drape"));
     let threads = experiment.options.threads;
-    let trials = experiment.trials(sequence, |batch| {
+    let made = experiment.trials(sequence, |batch| {
         in_parallel("trial", batch, threads, |index| trial(&experiment, index))
     })?;
+    let Some(trials) = made else {
+        return experiment.finish_shard();
+    };
     let rows = CONDITIONS.map(|(lead, of)| {
         let throws: Vec<&Throws> = trials.iter().map(of).collect();
         Row::of(lead, &throws)

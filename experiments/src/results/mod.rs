@@ -25,10 +25,12 @@ mod strikes;
 mod sysid;
 mod wiggles;
 
-use crate::args::{ResultArgs, ResultCommand};
-use cli_output::Outcome;
+pub use checkpoint::merge as join;
+
+use crate::args::{MergeArgs, ResultArgs, ResultCommand};
+use cli_output::{OrInput, Outcome};
 use experiment::Experiment;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 type Study = fn(Experiment<'_>) -> Outcome<Option<Value>>;
 
@@ -51,4 +53,17 @@ pub fn run(command: &ResultCommand) -> Outcome<Option<Value>> {
         ResultCommand::SensitivityMaps(args) => ("sensitivity-maps", args, sensitivity::run),
     };
     study(Experiment::begin(name, args)?)
+}
+
+/// Joins the shards of a study.
+pub fn merge(args: &MergeArgs) -> Outcome<Option<Value>> {
+    let count = join(&args.shards, &args.out).or_input()?;
+    println!(
+        "{count} trials in `{}`; the study's own command with --out prints their result",
+        args.out.display()
+    );
+    Ok(Some(json!({
+        "ok": true, "command": "merge", "trials": count, "shards": args.shards.len(),
+        "out": args.out,
+    })))
 }

@@ -48,7 +48,10 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
             outside_rope(seed, index / 2)
         }
     };
-    let trials = experiment.identified(2, rope)?;
+    let made = experiment.identified(2, rope)?;
+    let Some(trials) = made else {
+        return experiment.finish_shard();
+    };
     let all = format!("{} ropes", trials.len());
     let (inside, outside): (Vec<Trial>, Vec<Trial>) =
         trials.into_iter().partition(|t| t.index.is_multiple_of(2));

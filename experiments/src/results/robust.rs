@@ -136,7 +136,10 @@ fn row(
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let figure = |t: &RobustTrial| 100.0 * t.robust.strike.error_m;
     let sequence = experiment.sequence(ROPES, 2, (figure, "ropes, cm robust"));
-    let trials = strike_trials(&experiment, sequence, RobustTrial::of)?;
+    let made = strike_trials(&experiment, sequence, RobustTrial::of)?;
+    let Some(trials) = made else {
+        return experiment.finish_shard();
+    };
     let rows = [
         row(&trials, "for the identified rope", |t| t.plain),
         row(&trials, "for sixteen it might be", |t| t.robust),

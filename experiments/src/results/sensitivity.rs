@@ -122,7 +122,7 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
         ..experiment.sequence(ROPES, 1, (figure, "films, most per m"))
     };
     let (rig, seed) = (&experiment.rig, args.seed);
-    let trials = experiment.trials(sequence, |batch| {
+    let made = experiment.trials(sequence, |batch| {
         in_parallel("trial", batch, experiment.options.threads, |index| {
             let filmed = rig.film(&trial_rope(seed, index), seed, index)?;
             let features = net.see(&rig.observation(&filmed))?;
@@ -130,6 +130,9 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
             Ok(SensitivityTrial { index, map })
         })
     })?;
+    let Some(trials) = made else {
+        return experiment.finish_shard();
+    };
     let map = mean(&trials).ok_or_else(|| bad_input!("--ropes is 0, but must be 1 or more"))?;
     let moment_s = MOMENT_FRAMES as f64 / net.metadata().features.rate_hz;
     let rows = rows(&map, moment_s);

@@ -111,12 +111,12 @@ pub(super) struct StrikeCase {
     pub thrower: Thrower,
 }
 
-/// The trials of a sequence, each made with `make`.
+/// The trials of a sequence, each made with `make`; none where only a shard was asked for.
 pub(super) fn strike_trials<T: Send + Serialize + DeserializeOwned>(
     experiment: &Experiment<'_>,
     sequence: Sequence<T>,
     make: impl Fn(&StrikeCase) -> Result<T, PlanError> + Sync,
-) -> Outcome<Vec<T>> {
+) -> Outcome<Option<Vec<T>>> {
     let (seed, rig, options) = (experiment.args.seed, &experiment.rig, &experiment.options);
     let trial = |index| {
         let truth = trial_rope(seed, index);

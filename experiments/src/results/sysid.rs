@@ -34,7 +34,10 @@ const RATIOS: [Column<RatioRow>; 3] = [
 
 pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
     let seed = experiment.args.seed;
-    let trials = experiment.identified(1, |index| trial_rope(seed, index))?;
+    let made = experiment.identified(1, |index| trial_rope(seed, index))?;
+    let Some(trials) = made else {
+        return experiment.finish_shard();
+    };
     let summary = summarise(&trials);
     let curves = summary.parameters.iter().zip(RANGES).enumerate();
     let curves = curves.map(|(at, (row, range))| {

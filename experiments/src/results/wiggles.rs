@@ -63,7 +63,7 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
         ..requested
     };
     // Wiggle by wiggle; a trial's own index is that of the rope.
-    let all = experiment.trials(sequence, |batch| {
+    let made = experiment.trials(sequence, |batch| {
         let rope = |index| trial_rope(args.seed, index);
         let mut made = Vec::with_capacity(batch.len());
         for one_wiggle in batch.chunk_by(|a, b| a / ropes == b / ropes) {
@@ -73,6 +73,9 @@ pub(super) fn run(experiment: Experiment<'_>) -> Outcome<Option<Value>> {
         }
         Ok(made)
     })?;
+    let Some(all) = made else {
+        return experiment.finish_shard();
+    };
     let each = usize::try_from(ropes).or_failed()?;
     let summaries: Vec<SysidSummary> = all.chunks(each).map(summarise).collect();
     let curve = |(wiggle, trials): (&AblatedWiggle, &[Trial])| Curve {

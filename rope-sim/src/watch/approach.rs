@@ -25,21 +25,22 @@ pub struct ClosestApproach {
 }
 
 /// What the lead comes near to, relative to the clock's origin (m).
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Target {
-    Point([f64; 3]),
+#[derive(Clone, Copy)]
+pub(super) enum Target<V> {
+    /// In each lane its own.
+    Point(Vec3<V>),
     /// Between two ends.
     Segment([[f64; 3]; 2]),
 }
 
-impl Target {
+impl<V: Lanes> Target<V> {
     /// Rating of a step by a straight line in place of its path: squared distance (m²).
     #[inline(always)]
-    fn rate<V: Lanes>(&self, tip: &TipStep<V>) -> V {
+    fn rate(&self, tip: &TipStep<V>) -> V {
         match *self {
-            Self::Point([x, y, z]) => {
+            Self::Point(point) => {
                 let zero = V::splat(0.0);
-                let [x, v] = [tip.after[0].sub(Vec3::splat(x, y, z)), tip.after[1]];
+                let [x, v] = [tip.after[0].sub(point), tip.after[1]];
                 let back = x.dot(v) * (v.dot(v) + V::splat(1e-12)).recip();
                 let nearest = v.scale_sub(back.max(zero).min(tip.h), x);
                 nearest.dot(nearest)
@@ -51,10 +52,10 @@ impl Target {
         }
     }
 
-    /// Its point nearest to `x`.
-    fn foot(&self, x: [f64; 3]) -> [f64; 3] {
+    /// Its point nearest to `x` in one lane.
+    fn foot(&self, lane: usize, x: [f64; 3]) -> [f64; 3] {
         match *self {
-            Self::Point(point) => point,
+            Self::Point(point) => point.get(lane),
             Self::Segment(ends) => nearest_on(ends, x),
         }
     }
@@ -62,13 +63,13 @@ impl Target {
 
 /// Watches the distance to a point or a segment.
 pub(super) struct ApproachRecorder<V> {
-    target: Target,
+    target: Target<V>,
     best: BestStep<V>,
 }
 
 impl<V: Lanes> ApproachRecorder<V> {
     #[inline(always)]
-    pub(super) fn new(target: Target, tip: [Vec3<V>; 2]) -> Self {
+    pub(super) fn new(target: Target<V>, tip: [Vec3<V>; 2]) -> Self {
         Self {
             target,
             best: BestStep::new(tip),
@@ -90,9 +91,9 @@ impl<V: Lanes> ApproachRecorder<V> {
         time_of_step: impl Fn(usize) -> (f64, f64),
     ) -> ClosestApproach {
         let (cubic, start_s) = self.best.cubic(lane, time_of_step);
-        let u = cubic.nearest(|x| self.target.foot(x));
+        let u = cubic.nearest(|x| self.target.foot(lane, x));
         let tip = cubic.at(u);
-        let foot = self.target.foot(tip);
+        let foot = self.target.foot(lane, tip);
         let squared: f64 = (0..3).map(|i| (tip[i] - foot[i]).powi(2)).sum();
         ClosestApproach {
             distance_m: squared.sqrt(),
@@ -140,7 +141,7 @@ mod tests {
 
     /// Closest approach of a path with its velocity, in `steps` steps of `h`.
     fn closest(
-        target: Target,
+        target: Target<f64>,
         state: impl Fn(f64) -> [Vec3<f64>; 2],
         h: f64,
         steps: u32,
@@ -156,7 +157,7 @@ mod tests {
     fn passing_between_two_steps_is_seen() {
         // Along x at 10 m/s, 3 mm beside the target, passing it at t = 0.0127.
         let state = |t: f64| [Vec3(10.0 * (t - 0.0127), 0.003, 0.0), Vec3(10.0, 0.0, 0.0)];
-        let closest = closest(Target::Point([0.0; 3]), state, 1e-3, 30);
+        let closest = closest(Target::Point(Vec3::zero()), state, 1e-3, 30);
         assert!((closest.distance_m - 0.003).abs() < 1e-12);
         assert!((closest.time_s - 0.0127).abs() < 1e-12);
         assert!((closest.tip_m[0] - 1.0).abs() < 1e-10);
@@ -174,7 +175,7 @@ mod tests {
                 Vec3(0.1 * turn * c, 0.1 * turn * s, 0.0),
             ]
         };
-        let closest = closest(Target::Point([0.0; 3]), state, 2e-3, 25);
+        let closest = closest(Target::Point(Vec3::zero()), state, 2e-3, 25);
         assert!((closest.distance_m - 0.002).abs() < 1e-7, "{closest:?}");
         assert!((closest.time_s - 0.0213).abs() < 1e-6, "{closest:?}");
         assert!((closest.velocity_m_s[0] - 4.0).abs() < 1e-3, "{closest:?}");

@@ -105,6 +105,8 @@ impl Watch {
 pub(crate) struct Watcher<V> {
     origin_m: [f64; 3],
     lanes: usize,
+    /// Lanes that have a point to come near to.
+    has_point: Vec<bool>,
     /// Steps so far.
     count: f64,
     tip: [Vec3<V>; 2],
@@ -118,21 +120,35 @@ pub(crate) struct Watcher<V> {
 }
 
 impl<V: Lanes> Watcher<V> {
-    /// For `lanes` leads with these positions, relative to the clock's origin
-    /// [`Watch::origin_m`], and velocities at the start.
+    /// For leads with these positions, relative to the clock's origin [`Watch::origin_m`], and
+    /// velocities at the start; one lane for each of `points_m`, which goes before the watch's.
     #[inline(always)]
-    pub(crate) fn new(watch: &Watch, tip: [Vec3<V>; 2], lanes: usize, horizon_s: f64) -> Self {
-        let origin_m = watch.origin_m();
+    pub(crate) fn new(
+        watch: &Watch,
+        tip: [Vec3<V>; 2],
+        points_m: &[Option<[f64; 3]>],
+        horizon_s: f64,
+    ) -> Self {
+        let (origin_m, lanes) = (watch.origin_m(), points_m.len());
         let relative = |x: [f64; 3]| core::array::from_fn(|i| x[i] - origin_m[i]);
+        let mut points = Vec3::zero();
+        let mut has_point = vec![false; lanes];
+        for (lane, own) in points_m.iter().enumerate() {
+            if let Some(point_m) = own.or(watch.point_m) {
+                points.set(lane, relative(point_m));
+                has_point[lane] = true;
+            }
+        }
         Self {
             origin_m,
             lanes,
             count: 0.0,
             tip,
             peak_speed_squared: tip[1].dot(tip[1]),
-            to_point: watch
-                .point_m
-                .map(|point| ApproachRecorder::new(Target::Point(relative(point)), tip)),
+            to_point: has_point
+                .contains(&true)
+                .then(|| ApproachRecorder::new(Target::Point(points), tip)),
+            has_point,
             to_segment: watch
                 .segment_m
                 .map(|ends| ApproachRecorder::new(Target::Segment(ends.map(relative)), tip)),
@@ -202,7 +218,11 @@ impl<V: Lanes> Watcher<V> {
         let closest =
             |recorder: &ApproachRecorder<V>| recorder.closest(lane, origin_m, time_of_step);
         Watched {
-            to_point: self.to_point.as_ref().map(closest),
+            to_point: self
+                .to_point
+                .as_ref()
+                .filter(|_| self.has_point[lane])
+                .map(closest),
             to_segment: self.to_segment.as_ref().map(closest),
             dwell: self.dwell.as_ref().map(|r| r.dwell(lane)),
             highest_m: self

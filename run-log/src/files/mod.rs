@@ -16,7 +16,7 @@ pub use rope::{read_posterior, read_rope, read_unconfirmed, write_new_rope, writ
 pub(crate) use text::cannot_read;
 pub use text::{
     located, read_arm_response, read_cell, read_excitation, read_json, read_plan, read_text,
-    write_arm_response,
+    read_toml, write_arm_response,
 };
 
 /// File of a run folder that holds the whole run.

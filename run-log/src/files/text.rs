@@ -27,7 +27,10 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
 }
 
 /// Reads TOML; `what` is what errors call the file.
-pub(super) fn read_toml<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T> {
+///
+/// # Errors
+/// The file cannot be read, or is no TOML of this type.
+pub fn read_toml<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T> {
     toml::from_str(&read_text(path)?).with_context(|| format!("{what} `{}`", path.display()))
 }
 

@@ -61,9 +61,12 @@ pub(in crate::results) fn run(args: &MujocoArgs) -> Outcome<Option<Value>> {
         })
     };
     let threads = experiment.options.threads;
-    let trials = experiment.trials(sequence, |batch| {
+    let made = experiment.trials(sequence, |batch| {
         in_parallel("trial", batch, threads, trial)
     })?;
+    let Some(trials) = made else {
+        return experiment.finish_shard();
+    };
     let both = |name: &str, of: &dyn Fn(RopeKind) -> bool| {
         let of: Vec<&Trial> = trials.iter().filter(|t| of(t.kind)).collect();
         let unrelated: Vec<&Fate> = of.iter().map(|t| &t.unrelated).collect();

@@ -79,9 +79,12 @@ pub(super) fn run(args: &OtherRealityArgs) -> Outcome<Option<Value>> {
         })
     };
     let threads = experiment.options.threads;
-    let trials = experiment.trials(sequence, |batch| {
+    let made = experiment.trials(sequence, |batch| {
         in_parallel("trial", batch, threads, trial)
     })?;
+    let Some(trials) = made else {
+        return experiment.finish_shard();
+    };
     let with = |channel: &ChannelName| {
         let with = trials.iter().filter(|t| t.channel == *channel);
         let fates: Vec<&Fate> = with.map(|t| &t.fate).collect();

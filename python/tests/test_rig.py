@@ -1,0 +1,87 @@
+"""The simulated rig, films and runs from Python."""
+
+import os
+import shutil
+import socket
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import wag
+
+WAG = os.environ.get("WAG_PROGRAM") or shutil.which("wag")
+
+
+def test_the_arm_listens_while_the_block_lasts():
+    with wag.Rig(seed=3) as rig:
+        port = rig.command_port
+        socket.create_connection(("127.0.0.1", port), timeout=5.0).close()
+        assert rig.arguments[:2] == ["--arm", "127.0.0.1"]
+    with pytest.raises(OSError):
+        socket.create_connection(("127.0.0.1", port), timeout=1.0)
+    with pytest.raises(wag.InputError, match="does not run"):
+        rig.command_port
+
+
+def test_a_port_in_use_is_told():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        with pytest.raises(wag.FailedError):
+            wag.Rig(command_port=taken.getsockname()[1]).start()
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A whole run of the program against a rig of this process."""
+    assert WAG, "the program `wag` is missing: build it, and name it in WAG_PROGRAM"
+    folder = tmp_path_factory.mktemp("run") / "strike"
+    with wag.Rig(seed=11, camera=f"python-{os.getpid()}") as rig:
+        command = [WAG, "run", "strike", *rig.arguments, "--yes", "--keep-films"]
+        done = subprocess.run([*command, "--out", str(folder)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_a_run_is_arrays_and_frames(run):
+    found = wag.load_run(run)
+    assert found.summary["ok"] and found.rope is not None
+    assert found.plan["trajectory_sha256"] and found.keypoints.points_px.ndim == 3
+    cycles, reports = found.cycles, found.reports
+    assert cycles["q_commanded_rad"].shape == (len(cycles["cycle"]), 7)
+    assert (np.diff(reports["stamp_ns"].astype(np.int64)) > 0).all()
+    pytest.importorskip("pandas")
+    frame = found.reports_frame()
+    assert {"q1_rad", "q7_rad", "qd3_rad_s"} <= set(frame.columns) and frame.index.name == "t_s"
+
+
+def test_the_rope_of_a_run_is_identified_again(run):
+    kept = wag.load_run(run)
+    found = wag.identify(run, seed=int(kept.summary["seed"]) if "seed" in kept.summary else 0)
+    assert abs(found.rope.length_m - kept.rope.length_m) < 2e-3
+    low, high = found.interval_90[1]
+    assert low < found.rope.length_m < high and found.covariance.shape == (9, 9)
+    plan = wag.plan("strike", found, [0.95, 0.0, 0.2])
+    assert plan.forecast is not None
+
+
+def test_a_film_is_tracked_as_the_run_did(run):
+    kept = wag.load_run(run)
+    film = next(Path(run).glob("wiggle_*.yuyv"))
+    reports, epoch = kept.reports, kept.epoch_ns
+    t_s = (reports["stamp_ns"].astype(np.int64) - epoch) * 1e-9
+    around = (t_s > -0.3) & (t_s < kept.keypoints.t_s[-1] + 0.3)
+    motion = wag.Motion.joints(t_s[around], reports["q_rad"][around])
+    track = wag.track(film, run / "camera.toml", motion)
+    apart = np.linalg.norm(track.points_px - kept.keypoints.points_px, axis=2)
+    assert np.median(apart) < 0.1 and not track.unconfirmed
+    short = wag.Motion.joints(t_s[around][:100], reports["q_rad"][around][:100])
+    with pytest.raises(wag.InputError, match="film lasts"):
+        wag.track(film, run / "camera.toml", short)
+
+
+def test_no_run_and_no_keypoints_are_told(tmp_path):
+    with pytest.raises(wag.InputError, match="does not exist"):
+        wag.load_run(tmp_path / "nothing")
+    (tmp_path / "keypoints.json").write_text("{}")
+    with pytest.raises(wag.InputError, match="not keypoints"):
+        wag.Track.load(tmp_path / "keypoints.json")
