@@ -2,6 +2,7 @@
 
 use crate::error::{OrRaise, interruptible, raised};
 use crate::motion::{Motion, cell_of};
+use crate::simulate::THREADS_MAX;
 use anyhow::Context;
 use camera_ingest::source::read_film;
 use camera_ingest::{load_camera, open_video};
@@ -81,7 +82,7 @@ impl How {
             seed: self.seed,
             length_m: self.length_m,
             lead_mass_kg: self.lead_mass_kg,
-            threads: self.threads,
+            threads: self.threads.clamp(1, THREADS_MAX),
             ..config.identify
         })
     }
@@ -116,15 +117,17 @@ pub(crate) fn identify(
 }
 
 /// The same of a run's wiggle as it was tracked, with the run's own camera and cell: the
-/// estimate, and why the track should not be relied on.
+/// estimate, and why the track should not be relied on. Nothing is identified where that is so
+/// and was not accepted.
 #[pyfunction]
-#[pyo3(signature = (run, how, cell = None))]
+#[pyo3(signature = (run, how, accepted, cell = None))]
 pub(crate) fn identify_run(
     py: Python<'_>,
     run: PathBuf,
     how: How,
+    accepted: bool,
     cell: Option<PathBuf>,
-) -> PyResult<(String, Vec<String>)> {
+) -> PyResult<(Option<String>, Vec<String>)> {
     let opened = Run::open(&run).or_input()?;
     let film = opened.tracked_film().or_input()?;
     let camera = load_camera(&opened.folder().join(files::CAMERA)).or_input()?;
@@ -135,8 +138,19 @@ pub(crate) fn identify_run(
         .check_covers(film.track.frames.last().map_or(0.0, |frame| frame.t_s))
         .or_input()?;
     let motion = clamp.attach().or_input()?;
+    let mut unconfirmed = film.track.unconfirmed.clone();
+    // What the camera's side of the run found, which is kept in its summary.
+    let summary = opened.summary().or_input()?.unwrap_or_default();
+    let kept = summary["track"]["unconfirmed"]
+        .as_array()
+        .into_iter()
+        .flatten();
+    unconfirmed.extend(kept.filter_map(|why| why.as_str().map(str::to_owned)));
+    if !(unconfirmed.is_empty() || accepted) {
+        return Ok((None, unconfirmed));
+    }
     let found = estimate(py, &film.track, (&camera, &*motion, film.radii_m), &how)?;
-    Ok((found, film.track.unconfirmed))
+    Ok((Some(found), unconfirmed))
 }
 
 fn estimate(

@@ -30,7 +30,7 @@ mod _wag {
     #[pymodule_export]
     use crate::rope::{parameters, random_rope, random_target, read_rope, write_rope};
     #[pymodule_export]
-    use crate::runs::read_cycles;
+    use crate::runs::{read_cycles, write_text};
     #[pymodule_export]
     use crate::simulate::simulate;
     #[pymodule_export]

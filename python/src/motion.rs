@@ -6,7 +6,8 @@ use arm_model::limits::{LimitKind, Margin};
 use arm_model::{Cell, JOINTS, JointTrajectory, JointVector, Limits, Pole};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLike1, PyArrayLike2,
+    PyArrayLike3,
 };
 use planner::wiggle::{WiggleConfig, wiggling_arm};
 use pyo3::prelude::*;
@@ -14,6 +15,11 @@ use rope_sim::{AttachMotion, PlannedArm, PoseRow, PoseTrack};
 use run_log::ClampMotion;
 use run_log::files::{self, JointsCsv};
 use std::path::{Path, PathBuf};
+
+/// What numpy makes numbers of: arrays of any number type, lists.
+type Numbers1<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
+type Numbers2<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+type Numbers3<'py> = PyArrayLike3<'py, f64, AllowTypeChange>;
 
 /// One number for each throw.
 type Array<'py, T> = Bound<'py, PyArray1<T>>;
@@ -118,10 +124,7 @@ fn pole_of(path: Option<&Path>) -> PyResult<Pole> {
 }
 
 /// Times (s) and joints (rad), as many of the one as of the other.
-fn joints_of(
-    times_s: &PyReadonlyArray1<'_, f64>,
-    q_rad: &PyReadonlyArray2<'_, f64>,
-) -> PyResult<JointsCsv> {
+fn joints_of(times_s: &Numbers1<'_>, q_rad: &Numbers2<'_>) -> PyResult<JointsCsv> {
     let (times_s, q_rad) = (times_s.as_array(), q_rad.as_array());
     let joints = || {
         ensure!(
@@ -146,11 +149,7 @@ impl Motion {
     /// Joints as an arm reported them: a smooth curve near all of them.
     #[staticmethod]
     #[pyo3(signature = (times_s, q_rad, *, cell = None))]
-    fn joints(
-        times_s: PyReadonlyArray1<'_, f64>,
-        q_rad: PyReadonlyArray2<'_, f64>,
-        cell: Option<PathBuf>,
-    ) -> PyResult<Self> {
+    fn joints(times_s: Numbers1<'_>, q_rad: Numbers2<'_>, cell: Option<PathBuf>) -> PyResult<Self> {
         let joints = joints_of(&times_s, &q_rad)?;
         let pole = pole_of(cell.as_deref())?;
         Self::recorded(ClampMotion::new(
@@ -173,9 +172,9 @@ impl Motion {
     /// Poses of the clamp, nearly without noise: a curve through all of them.
     #[staticmethod]
     fn poses(
-        times_s: PyReadonlyArray1<'_, f64>,
-        position_m: PyReadonlyArray2<'_, f64>,
-        quaternion_wxyz: PyReadonlyArray2<'_, f64>,
+        times_s: Numbers1<'_>,
+        position_m: Numbers2<'_>,
+        quaternion_wxyz: Numbers2<'_>,
     ) -> PyResult<Self> {
         let (t, p, q) = (
             times_s.as_array(),
@@ -213,8 +212,8 @@ impl Motion {
     #[staticmethod]
     #[pyo3(signature = (times_s, q_rad, *, cell = None))]
     fn waypoints(
-        times_s: PyReadonlyArray1<'_, f64>,
-        q_rad: PyReadonlyArray2<'_, f64>,
+        times_s: Numbers1<'_>,
+        q_rad: Numbers2<'_>,
         cell: Option<PathBuf>,
     ) -> PyResult<Self> {
         let joints = joints_of(&times_s, &q_rad)?;
@@ -240,8 +239,8 @@ impl Motion {
     #[pyo3(signature = (times_s, q_rad, *, limits = None, cell = None))]
     fn throws<'py>(
         py: Python<'py>,
-        times_s: PyReadonlyArray2<'py, f64>,
-        q_rad: PyReadonlyArray3<'py, f64>,
+        times_s: Numbers2<'py>,
+        q_rad: Numbers3<'py>,
         limits: Option<PathBuf>,
         cell: Option<PathBuf>,
     ) -> PyResult<(Vec<Self>, Array<'py, f64>, Array<'py, bool>)> {
@@ -285,7 +284,7 @@ impl Motion {
     fn at<'py>(
         &self,
         py: Python<'py>,
-        times_s: PyReadonlyArray1<'py, f64>,
+        times_s: Numbers1<'py>,
     ) -> (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>) {
         let times_s = times_s.as_array();
         let frames: Vec<_> = times_s.iter().map(|t| self.attach.at(*t)).collect();

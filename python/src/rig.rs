@@ -10,7 +10,7 @@ use shared_types::Task;
 use shared_types::ipc::DomainSweep;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
 use xarm_sim::ArmPorts;
@@ -34,7 +34,9 @@ impl Setup {
     fn config(&self) -> PyResult<RigConfig> {
         let named = serde_json::Value::from(self.task.as_str());
         let task = serde_json::from_value::<Task>(named).context("task");
-        let own = || format!("rig-{}", std::process::id());
+        static RIGS: AtomicU64 = AtomicU64::new(0);
+        let number = RIGS.fetch_add(1, Ordering::Relaxed);
+        let own = || format!("rig-{}-{number}", std::process::id());
         let mut config = RigConfig {
             domain: self.camera.clone().unwrap_or_else(own),
             seed: self.seed,

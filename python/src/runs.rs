@@ -6,10 +6,16 @@ use numpy::IntoPyArray;
 use numpy::ndarray::Array2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use run_log::Run;
+use run_log::{Run, files};
 use shared_types::FaultCode;
 use shared_types::ipc::{ControllerMode, CycleRecord, JointReport};
 use std::path::PathBuf;
+
+/// Writes a file, whole or not at all.
+#[pyfunction]
+pub(crate) fn write_text(path: PathBuf, text: &str) -> PyResult<()> {
+    files::write_atomic(&path, text.as_bytes()).or_failed()
+}
 
 /// Control cycles and joint reports of a run as arrays, times in ns (CLOCK_MONOTONIC); see
 /// `wag.Run`.
@@ -26,7 +32,10 @@ pub(crate) fn read_cycles(
     of_cycles.set_item("deadline_ns", array(py, cycles, |c| c.deadline_ns))?;
     let mode = |c: &CycleRecord| format!("{:?}", ControllerMode::from_raw(c.mode));
     of_cycles.set_item("mode", cycles.iter().map(mode).collect::<Vec<_>>())?;
-    let fault = |c: &CycleRecord| format!("{:?}", FaultCode::from_raw(c.fault).unwrap_or_default());
+    let fault = |c: &CycleRecord| match FaultCode::from_raw(c.fault) {
+        Some(fault) => format!("{fault:?}"),
+        None => format!("unknown fault {}", c.fault),
+    };
     of_cycles.set_item("fault", cycles.iter().map(fault).collect::<Vec<_>>())?;
     of_cycles.set_item("sent", array(py, cycles, |c| c.sent != 0))?;
     of_cycles.set_item("wake_late_ns", array(py, cycles, |c| c.wake_late_ns))?;

@@ -14,6 +14,22 @@ use rope_sim::{
 };
 use shared_types::RopeParams;
 
+/// Threads beyond which more make nothing faster.
+pub(crate) const THREADS_MAX: usize = 1024;
+/// Most numbers that one call may give back: 8 GB in double precision.
+pub(crate) const NUMBERS_MAX: u128 = 1_000_000_000;
+
+/// Refuses nodes that no memory holds.
+fn check_size(ropes: &[RopeParams], frames: usize) -> anyhow::Result<()> {
+    let nodes: u128 = ropes.iter().map(|rope| u128::from(rope.links) + 1).sum();
+    let numbers = 3 * nodes * frames as u128;
+    ensure!(
+        numbers <= NUMBERS_MAX,
+        "{frames} frames of these ropes are {numbers} numbers, at most {NUMBERS_MAX} are kept: lower `rate_hz`, or simulate fewer ropes at once"
+    );
+    Ok(())
+}
+
 /// What is simulated, and what is kept of it.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -51,7 +67,7 @@ impl Wanted {
                 rest_window_s: self.rest_window_s,
                 ..Watch::NOTHING
             },
-            threads: self.threads,
+            threads: self.threads.clamp(1, THREADS_MAX),
             ..SimOptions::new(self.step_s, precision, self.horizon_s)
         })
     }
@@ -92,11 +108,16 @@ pub(crate) fn simulate<'py>(
     let ropes = ropes_of_table(&table, &extras)?;
     let points = points_m.map(|points| rows_of_3(&points)).transpose()?;
     let options = wanted.options().or_input()?;
+    check_size(&ropes, options.frames.count).or_input()?;
     let motions: Vec<&Motion> = motions.iter().map(Py::get).collect();
     let candidates = candidates(&ropes, &motions, points.as_deref()).or_input()?;
+    let asked = Watch {
+        point_m: points.as_ref().map(|_| [0.0; 3]),
+        ..options.watch
+    };
     let rollouts = py.detach(|| roll_out(&candidates, &options)).or_input()?;
     drop(candidates);
-    kept(py, rollouts)
+    kept(py, &asked, rollouts)
 }
 
 /// Pairs ropes with motions and points; one of these is that of all ropes.
@@ -141,8 +162,12 @@ fn rows_of_3(table: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
 /// A closest approach that was watched.
 type Measured = fn(&Rollout) -> Option<ClosestApproach>;
 
-/// Every number of the rollouts; nodes without a copy.
-fn kept(py: Python<'_>, rollouts: Vec<Rollout>) -> PyResult<Bound<'_, PyDict>> {
+/// Every number of the rollouts that was asked for; nodes without a copy.
+fn kept<'py>(
+    py: Python<'py>,
+    asked: &Watch,
+    rollouts: Vec<Rollout>,
+) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     let of = |what: fn(&Rollout) -> f64| rollouts.iter().map(what).collect::<Vec<_>>();
     out.set_item(
@@ -157,20 +182,22 @@ fn kept(py: Python<'_>, rollouts: Vec<Rollout>) -> PyResult<Bound<'_, PyDict>> {
     };
     out.set_item("diverged", is(Outcome::Diverged).into_pyarray(py))?;
     out.set_item("rerun", is(Outcome::RerunAtQuarterStep).into_pyarray(py))?;
-    let approaches: [(&str, Measured); 2] = [
-        ("point", |r| r.watched.to_point),
-        ("segment", |r| r.watched.to_segment),
+    let approaches: [(&str, bool, Measured); 2] = [
+        ("point", asked.point_m.is_some(), |r| r.watched.to_point),
+        ("segment", asked.segment_m.is_some(), |r| {
+            r.watched.to_segment
+        }),
     ];
-    for (name, approach) in approaches {
-        if rollouts.iter().any(|r| approach(r).is_some()) {
+    for (name, is_asked, approach) in approaches {
+        if is_asked {
             out.set_item(name, approach_arrays(py, &rollouts, approach)?)?;
         }
     }
-    if rollouts.iter().any(|r| r.watched.highest_m.is_some()) {
+    if asked.height {
         let highest = of(|r| r.watched.highest_m.unwrap_or(f64::NAN));
         out.set_item("highest_m", highest.into_pyarray(py))?;
     }
-    if rollouts.iter().any(|r| r.watched.rest.is_some()) {
+    if asked.rest_window_s.is_some() {
         let spread = of(|r| r.watched.rest.map_or(f64::NAN, |r| r.tip_height_spread_m));
         let moved = of(|r| r.watched.rest.map_or(f64::NAN, |r| r.middle_movement_m));
         out.set_item("tip_height_spread_m", spread.into_pyarray(py))?;
@@ -180,15 +207,22 @@ fn kept(py: Python<'_>, rollouts: Vec<Rollout>) -> PyResult<Bound<'_, PyDict>> {
     for rollout in rollouts {
         let [frames, count, _] = rollout.nodes.shape();
         let shape = (frames, count, 3);
+        let is_lost = rollout.outcome == Outcome::Diverged;
         match rollout.nodes.into_numbers() {
-            NodeNumbers::F32(v) => {
+            NodeNumbers::F32(mut v) => {
+                if is_lost {
+                    v.fill(f32::NAN);
+                }
                 nodes.append(
                     Array3::from_shape_vec(shape, v)
                         .or_failed()?
                         .into_pyarray(py),
                 )?;
             }
-            NodeNumbers::F64(v) => {
+            NodeNumbers::F64(mut v) => {
+                if is_lost {
+                    v.fill(f64::NAN);
+                }
                 nodes.append(
                     Array3::from_shape_vec(shape, v)
                         .or_failed()?

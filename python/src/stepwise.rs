@@ -3,6 +3,7 @@
 use crate::error::OrRaise;
 use crate::motion::cell_of;
 use crate::rope::ropes_of_table;
+use crate::simulate::{NUMBERS_MAX, THREADS_MAX};
 use anyhow::ensure;
 use arm_model::{JOINTS, JointState, JointVector, Pole};
 use numpy::ndarray::{Array2, Array3, ArrayView2};
@@ -11,6 +12,9 @@ use pyo3::prelude::*;
 use rope_sim::LiveRope;
 use shared_types::RopeParams;
 use std::path::PathBuf;
+
+/// Most steps of one call: nothing ends it sooner.
+const STEPS_MAX: f64 = 1e8;
 
 /// One rope and the arm that it hangs from.
 struct Hanging {
@@ -87,7 +91,7 @@ impl HangingRopes {
             all: all.collect::<PyResult<_>>()?,
             pole,
             step_s,
-            threads: threads.max(1),
+            threads: threads.clamp(1, THREADS_MAX),
         })
     }
 
@@ -112,8 +116,12 @@ impl HangingRopes {
             Ok(())
         };
         known().or_input()?;
-        for (index, rope) in indices.iter().zip(&ropes) {
-            self.all[*index] = Hanging::new(rope, q, &self.pole, self.step_s)?;
+        // All or none.
+        let hung = ropes
+            .iter()
+            .map(|rope| Hanging::new(rope, q, &self.pole, self.step_s));
+        for (index, hanging) in indices.into_iter().zip(hung.collect::<PyResult<Vec<_>>>()?) {
+            self.all[index] = hanging;
         }
         Ok(())
     }
@@ -128,7 +136,8 @@ impl HangingRopes {
         samples: usize,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let count = self.all.len();
-        let qdd = qdd_rad_s2.as_array();
+        // Copied: another thread may write into the array meanwhile.
+        let qdd = qdd_rad_s2.as_array().to_owned();
         let usable = || {
             ensure!(
                 qdd.dim() == (count, JOINTS),
@@ -136,8 +145,12 @@ impl HangingRopes {
                 qdd.dim()
             );
             ensure!(
-                period_s > 0.0 && period_s.is_finite() && samples > 0,
-                "`period_s` and `samples` must be above 0"
+                period_s > 0.0 && period_s / self.step_s <= STEPS_MAX && samples > 0,
+                "`period_s` and `samples` must be above 0, and a period at most 1e8 steps"
+            );
+            ensure!(
+                3 * count as u128 * samples as u128 <= NUMBERS_MAX,
+                "`samples` is {samples}: {count} ropes have more tips then than memory"
             );
             ensure!(
                 qdd.iter().all(|x| x.is_finite()),
@@ -148,7 +161,15 @@ impl HangingRopes {
         usable().or_input()?;
         let mut tips = vec![[0.0; 3]; count * samples];
         let (all, pole, threads) = (&mut self.all, &self.pole, self.threads);
-        py.detach(|| advance_all(all, (&qdd, period_s), pole, (&mut tips, samples), threads));
+        py.detach(|| {
+            advance_all(
+                all,
+                (&qdd.view(), period_s),
+                pole,
+                (&mut tips, samples),
+                threads,
+            )
+        });
         let flat = tips.into_iter().flatten().collect();
         let tips = Array3::from_shape_vec((count, samples, 3), flat).or_failed()?;
         Ok(tips.into_pyarray(py))

@@ -4,14 +4,15 @@ use crate::error::{OrRaise, interruptible, of_plan};
 use crate::film::config_of;
 use crate::motion::{cell_of, limits_of};
 use crate::rope::rope_of_json;
-use anyhow::Context;
+use crate::simulate::THREADS_MAX;
+use anyhow::{Context, ensure};
 use planner::arm_response::Following;
-use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, warnings};
+use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, shortcoming, warnings};
 use pyo3::prelude::*;
 use run_log::files;
 use serde_json::json;
-use shared_types::Task;
 use shared_types::rope::RopePosterior;
+use shared_types::{RopeParams, Task};
 use std::path::PathBuf;
 
 /// What a throw is planned with, beside rope and target.
@@ -50,23 +51,25 @@ pub(crate) fn plan(
     let limits = limits_of(given.limits.as_deref())?;
     let response = given.arm_response.as_deref().map(files::read_arm_response);
     let response = response.transpose().or_input()?;
-    let ensemble = match posterior {
-        Some(text) => {
-            let posterior: RopePosterior =
-                serde_json::from_str(text).context("posterior").or_input()?;
-            let (robust, seed) = (given.robust, given.seed);
-            let forecast = PosteriorEnsemble::FORECAST;
-            PosteriorEnsemble::drawn(&rope, &posterior, robust, forecast, seed)
-        }
-        None => PosteriorEnsemble::default(),
-    };
+    let posterior = posterior
+        .map(serde_json::from_str::<RopePosterior>)
+        .transpose();
+    let posterior = posterior.context("posterior").or_input()?;
+    let ensemble = posterior.map_or_else(
+        || Ok(PosteriorEnsemble::default()),
+        |posterior| ensemble(&rope, &posterior, &given),
+    );
+    let ensemble = ensemble.or_input()?;
     let request = PlanRequest {
         goal: config.goal(kind, target_m),
         rope,
-        cell: cell_of(given.cell.as_deref())?,
+        cell: match &given.cell {
+            Some(path) => cell_of(Some(path))?,
+            None => config.cell,
+        },
         options: PlanOptions {
             seed: given.seed,
-            threads: given.threads,
+            threads: given.threads.clamp(1, THREADS_MAX),
             ..config.search
         },
         ensemble,
@@ -75,6 +78,38 @@ pub(crate) fn plan(
     };
     interruptible(py, |progress| {
         let plan = planner::plan(&request, progress).map_err(of_plan)?;
-        Ok(json!({ "warnings": warnings(&plan), "plan": plan }).to_string())
+        let severe = shortcoming(&plan)
+            .filter(|s| s.is_severe)
+            .map(|s| s.message);
+        let told = json!({ "warnings": warnings(&plan), "shortcoming": severe, "plan": plan });
+        Ok(told.to_string())
     })
+}
+
+/// What the rope might be instead, as `wag plan` takes it.
+fn ensemble(
+    rope: &RopeParams,
+    posterior: &RopePosterior,
+    given: &Given,
+) -> anyhow::Result<PosteriorEnsemble> {
+    /// Ropes that a plan may weigh.
+    const ROBUST_MAX: usize = 1000;
+    let robust = given.robust;
+    ensure!(
+        robust <= ROBUST_MAX,
+        "`robust` is {robust}, but must be at most {ROBUST_MAX} ropes"
+    );
+    // A file of before does not say how well the model explains the film.
+    let forecast = if posterior.residual_m > 0.0 {
+        PosteriorEnsemble::FORECAST
+    } else {
+        0
+    };
+    let drawn = PosteriorEnsemble::drawn(rope, posterior, robust, forecast, given.seed);
+    let count = drawn.optimised.len();
+    ensure!(
+        count == robust,
+        "what the identified rope leaves open is hardly ever a rope: {count} of {robust} could be drawn; film and identify it again"
+    );
+    Ok(drawn)
 }

@@ -27,6 +27,20 @@ def test_a_seed_tells_everything(name):
         assert np.array_equal(a, b)
 
 
+def test_a_throw_does_not_depend_on_its_neighbours():
+    envs, one = wag.gym.ThrowVectorEnv(6), wag.gym.ThrowVectorEnv(1)
+    envs.reset(seed=4)
+    one.reset(seed=1)
+    trials = envs._trials
+    envs.action_space.seed(4)
+    actions = envs.action_space.sample()
+    *_, infos = envs.step(actions)
+    for i in range(6):
+        one._trials.ropes, one._trials.targets_m = trials.ropes[i : i + 1], trials.targets_m[i : i + 1]
+        *_, alone = one.step(actions[i : i + 1])
+        assert alone["distance_m"][0] == pytest.approx(infos["distance_m"][i], abs=1e-6)
+
+
 def test_a_planned_throw_is_as_good_in_the_environment():
     envs = wag.gym.ThrowVectorEnv(4, step_s=5e-4, precision="f64")
     envs.reset(seed=2)
@@ -43,6 +57,32 @@ def test_a_planned_throw_is_as_good_in_the_environment():
     _, rewards, ended, _, infos = envs.step(actions)
     assert ended.all() and (infos["distance_m"] < 0.02).all(), infos["distance_m"]
     assert np.allclose(rewards, -infos["distance_m"])
+
+
+@pytest.mark.parametrize("envs", [wag.gym.ThrowVectorEnv, wag.gym.SwingVectorEnv])
+def test_what_cannot_be_done_is_told(envs):
+    size = envs(2).single_action_space.shape[0]
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        envs(2).step(np.zeros((2, size)))
+    made = envs(2)
+    with pytest.raises(wag.InputError, match="target"):
+        made.reset(options={"target": [1.0, 0.0, 0.0]})
+    made.reset(seed=1, options={"targets_m": [[0.9, 0.0, 0.1]] * 2})
+    assert (made._trials.targets_m == [0.9, 0.0, 0.1]).all()
+    for actions in (np.zeros((1, size)), np.zeros(size), None):
+        with pytest.raises(wag.InputError, match="actions"):
+            made.step(actions)
+    for wrong in ({"num_envs": 0}, {"step_s": -1.0}, {"threads": 0}):
+        with pytest.raises(wag.InputError, match=next(iter(wrong))):
+            envs(**{"num_envs": 2, **wrong})
+
+
+def test_a_throw_out_of_a_joint_s_range_misses_by_more_than_any():
+    envs = wag.gym.ThrowVectorEnv(2, reach_rad=6.0)
+    envs.reset(seed=1)
+    out_of_range, within = np.ones((1, 12)), np.zeros((1, 12))
+    _, rewards, *_ = envs.step(np.concatenate([out_of_range, within]))
+    assert rewards[0] == -envs.NOT_THROWN_M < rewards[1]
 
 
 def test_a_swing_ends_and_begins_anew():

@@ -115,6 +115,23 @@ def test_extras_count(ropes):
         wag.simulate(replace(ropes[0], extras=drag), still)
 
 
+def test_what_was_asked_for_is_there_even_of_no_rope(ropes):
+    none = wag.simulate([], wag.Motion.wiggle(), point_m=[0.9, 0, 0], height=True, rate_hz=10)
+    assert none.point.distance_m.shape == (0,) and none.highest_m.shape == (0,)
+    assert none.tips_m().shape == (0, 0, 3) and none.point.tip_m.shape == (0, 3)
+    listed = wag.Motion.waypoints([0, 1], [[0, 1, 0, 2, 0, 1, 0], [0, 1, 0, 2, 0, 2, 0]])
+    assert wag.simulate(ropes[0], listed).segment is None
+
+
+def test_a_rope_that_diverges_is_not_a_number(ropes):
+    q = np.zeros((3, 7))
+    q[1] = 200.0
+    whip = wag.Motion.waypoints([0, 0.004, 0.008], q)
+    found = wag.simulate(ropes[0], whip, horizon_s=0.5, point_m=[1, 0, 0], rate_hz=60, height=True)
+    assert found.diverged.all() and np.isnan(found.nodes_m[0]).all()
+    assert np.isnan(found.point.distance_m).all() and np.isnan(found.highest_m).all()
+
+
 def test_wrong_input_is_refused_in_words(ropes):
     wiggle = wag.Motion.wiggle()
     for given, words in [
@@ -122,6 +139,12 @@ def test_wrong_input_is_refused_in_words(ropes):
         ({"rate_hz": -1.0}, "rate_hz"),
         ({"precision": "f16"}, "precision"),
         ({"point_m": [[0.0, 0.0]]}, "shape"),
+        ({"horizon_s": -1.0, "rate_hz": 60.0}, "horizon_s"),
+        ({"rate_hz": 1e9}, "rate_hz"),
+        ({"threads": 0}, "threads"),
+        ({"segment_m": [0.0, 1.0]}, "segment_m"),
+        ({"straight_rad": [0.0]}, "straight_rad"),
+        ({"step_s": "fast"}, "step_s"),
         ({"point_m": np.zeros((3, 3))}, "one point or 2"),
         ({"point_m": [np.nan] * 3}, "point_m"),
     ]:
@@ -131,6 +154,25 @@ def test_wrong_input_is_refused_in_words(ropes):
         wag.simulate(ropes[:2], [wiggle] * 3)
     with pytest.raises(wag.InputError, match="length_m"):
         wag.simulate(wag.Rope.from_array([20, -1, 0.01, 0.1, 0.005, 0.05, 0.05, 0.02, 1]), wiggle)
-    with pytest.raises(wag.InputError, match="9 parameters"):
+    with pytest.raises(wag.InputError, match=r"\(n, 9\)"):
         wag.simulate(np.zeros((2, 8)), wiggle)
+    for wrong in (lambda: wag.Rope.random(-1), lambda: wag.Rope.random(1.5)):
+        with pytest.raises(wag.InputError, match="seed"):
+            wrong()
+    for wrong in ([np.nan] * 9, [1.0] * 8, "rope"):
+        with pytest.raises(wag.InputError, match="parameters"):
+            wag.Rope.from_array(wrong)
+    hanging = wag.HangingRopes(ropes[:2], [0, 0.8, 0, 2.4, 0, 1.6, 0])
+    for given, words in [
+        ((np.zeros((2, 6)), 0.1), "qdd_rad_s2"),
+        ((np.zeros((3, 7)), 0.1), "shape"),
+        ((np.full((2, 7), np.nan), 0.1), "finite"),
+        ((np.zeros((2, 7)), 1e9), "steps"),
+        ((np.zeros((2, 7)), 0.1, 10**12), "samples"),
+    ]:
+        with pytest.raises(wag.InputError, match=words):
+            hanging.advance(*given)
+    with pytest.raises(wag.InputError, match="length_m"):
+        hanging.replace([0, 1], [ropes[3], wag.Rope(20, -1, 0.01, 0.1, 0.005, 0.05, 0.05, 0.02, 1)])
+    assert np.allclose(hanging.nodes_m(0)[-1] - hanging.nodes_m(0)[0], [0, 0, -ropes[0].length_m])
     assert issubclass(wag.InputError, ValueError) and issubclass(wag.FailedError, RuntimeError)

@@ -14,7 +14,7 @@ def test_a_plan_hits_in_the_simulation_and_can_be_thrown(tmp_path):
     rope = wag.Rope.random(1)
     plan = wag.plan("strike", rope, [0.95, 0.0, 0.2], seed=1)
     assert plan.success and plan.predicted_error_m < 0.005
-    found = wag.simulate(rope, plan.motion(), horizon_s=plan.duration_s + 0.5, point_m=plan.target_m)
+    found = wag.simulate(rope, plan.motion(), horizon_s=plan.horizon_s, point_m=plan.target_m)
     assert found.point.distance_m[0] == pytest.approx(plan.predicted_error_m, abs=1e-4)
     plan.save(tmp_path / "plan.json")
     kept = json.loads((tmp_path / "plan.json").read_text())
@@ -26,6 +26,11 @@ def test_a_target_out_of_reach_is_refused():
         wag.plan("strike", wag.Rope.random(1), [3.0, 0.0, 0.2])
     with pytest.raises(wag.InputError, match="strike, lob or drape"):
         wag.plan("hit", wag.Rope.random(1), [0.95, 0.0, 0.2])
+    for target in ([1.0, 2.0], [np.nan] * 3, "there"):
+        with pytest.raises(wag.InputError, match="target"):
+            wag.plan("strike", wag.Rope.random(1), target)
+    with pytest.raises(wag.InputError, match="seed"):
+        wag.plan("strike", wag.Rope.random(1), [0.95, 0.0, 0.2], seed=-1)
     with pytest.raises(wag.InputError, match="robust"):
         wag.plan("strike", wag.Rope.random(1), [0.95, 0.0, 0.2], robust=8)
 

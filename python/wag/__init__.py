@@ -4,7 +4,7 @@
 
     rope = wag.Rope.random(seed=1)
     plan = wag.plan("strike", rope, target_m=(0.95, 0.0, 0.2))
-    flight = wag.simulate([rope], plan.motion(), horizon_s=plan.duration_s, point_m=plan.target_m)
+    flight = wag.simulate([rope], plan.motion(), horizon_s=plan.horizon_s, point_m=plan.target_m)
     print(flight.point.distance_m)
 
 Lengths are in metres, angles in radians, times in seconds, in the world frame of the arm (x

@@ -25,7 +25,7 @@ class Motion:
     """Motion of the rope's clamp in time: t = 0 is its begin, or a film's first frame."""
 
     @staticmethod
-    def joints(times_s: _Floats, q_rad: _Floats, *, cell: _Path | None = None) -> Motion:
+    def joints(times_s: npt.ArrayLike, q_rad: npt.ArrayLike, *, cell: _Path | None = None) -> Motion:
         """Joints as an arm reported them, (times,) and (times, 7): a smooth curve near them."""
     @staticmethod
     def joints_file(
@@ -33,18 +33,18 @@ class Motion:
     ) -> Motion:
         """The same from a file ``joints.csv``."""
     @staticmethod
-    def poses(times_s: _Floats, position_m: _Floats, quaternion_wxyz: _Floats) -> Motion:
+    def poses(times_s: npt.ArrayLike, position_m: npt.ArrayLike, quaternion_wxyz: npt.ArrayLike) -> Motion:
         """Poses of the clamp, nearly without noise: a curve through all of them."""
     @staticmethod
     def poses_file(path: _Path, *, film_late_s: float = 0.0) -> Motion:
         """The same from a file ``pose.csv``."""
     @staticmethod
-    def waypoints(times_s: _Floats, q_rad: _Floats, *, cell: _Path | None = None) -> Motion:
+    def waypoints(times_s: npt.ArrayLike, q_rad: npt.ArrayLike, *, cell: _Path | None = None) -> Motion:
         """An arm that follows a clamped cubic spline through these joints exactly: a throw."""
     @staticmethod
     def throws(
-        times_s: _Floats,
-        q_rad: _Floats,
+        times_s: npt.ArrayLike,
+        q_rad: npt.ArrayLike,
         *,
         limits: _Path | None = None,
         cell: _Path | None = None,
@@ -57,7 +57,7 @@ class Motion:
         """The wiggle that is filmed."""
     @property
     def duration_s(self) -> float: ...
-    def at(self, times_s: _Floats) -> tuple[_Floats, _Floats]:
+    def at(self, times_s: npt.ArrayLike) -> tuple[_Floats, _Floats]:
         """Positions (times, 3) in m and attitudes (times, 3, 3), clamp to world."""
 
 @final
@@ -96,6 +96,7 @@ def read_rope(path: _Path) -> str: ...
 def write_rope(
     path: _Path, rope: str, estimate: str | None = None, unconfirmed: Sequence[str] = ()
 ) -> None: ...
+def write_text(path: _Path, text: str) -> None: ...
 def read_cycles(run: _Path) -> tuple[dict[str, Any], dict[str, Any]]: ...
 def simulate(
     table: _Floats,
@@ -115,8 +116,8 @@ def identify(
     how: dict[str, Any],
 ) -> str: ...
 def identify_run(
-    run: _Path, how: dict[str, Any], cell: _Path | None = None
-) -> tuple[str, list[str]]: ...
+    run: _Path, how: dict[str, Any], accepted: bool, cell: _Path | None = None
+) -> tuple[str | None, list[str]]: ...
 def plan(
     task: str,
     rope: str,

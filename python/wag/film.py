@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from . import _wag
 from ._wag import FailedError, Motion
-from .rope import Floats, Rope
+from .given import Floats, number, numbers, whole
+from .rope import Rope
 from .simulation import THREADS
 
 PathLike = str | os.PathLike[str]
@@ -22,7 +23,7 @@ class UnconfirmedError(FailedError):
     """A track that should not be relied on; ``accept_unconfirmed=True`` goes on all the same."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Track:
     """Keypoints of a film, at equal distances along the rope, clamp first, lead's centre last."""
 
@@ -47,23 +48,27 @@ class Track:
         try:
             with open(path, encoding="utf-8") as file:
                 return cls._of(json.load(file))
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            words = f"`{os.fspath(path)}` is not keypoints (JSON, as `wag track` writes them): {error}"
+        except OSError as error:
+            words = f"cannot read `{os.fspath(path)}`: {error.strerror}"
+            raise _wag.InputError(words) from error
+        except (ValueError, KeyError, TypeError) as error:
+            lacks = f"lacks {error}" if isinstance(error, KeyError) else str(error)
+            words = f"`{os.fspath(path)}` is not keypoints (JSON, as `wag track` writes them): {lacks}"
             raise _wag.InputError(words) from error
 
     def save(self, path: PathLike) -> None:
         """Writes ``keypoints.json``."""
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(self.to_json())
+        _wag.write_text(path, self.to_json())
 
     @classmethod
     def _of(cls, kept: dict[str, Any], **others: Any) -> Track:
-        frames = kept["frames"]
+        frames, count = kept["frames"], kept["keypoints"]
+        points_px = numbers("points", [f["points"] for f in frames], (None, count, 2))
         return cls(
-            t_s=np.array([f["t_s"] for f in frames]),
-            points_px=np.array([f["points"] for f in frames]),
-            confidence=np.array([f["confidence"] for f in frames]),
-            lost=np.array([f["lost"] for f in frames]),
+            t_s=numbers("t_s", [f["t_s"] for f in frames], (None,)),
+            points_px=points_px,
+            confidence=numbers("confidence", [f["confidence"] for f in frames], (None, count)),
+            lost=np.array([f["lost"] for f in frames], dtype=bool),
             unconfirmed=kept.get("unconfirmed", []),
             **others,
         )
@@ -78,7 +83,7 @@ class Track:
         return json.dumps(kept | {"unconfirmed": list(self.unconfirmed)})
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Estimate:
     """An identified rope, and how well it is known. Arrays are in the order of ``PARAMETERS``."""
 
@@ -136,6 +141,8 @@ def track(
     motion: the clamp's; t = 0 is the film's first frame.
     rate_hz: of a recording that does not tell the times of its frames.
     """
+    keypoints = whole("keypoints", keypoints, 2, 32)
+    rate_hz = None if rate_hz is None else number("rate_hz", rate_hz)
     found = json.loads(_wag.track(video, camera, motion, keypoints, rate_hz))
     radii_m = (found["rope_radius_m"], found["lead_radius_m"])
     return Track._of(found["track"], radii_m=radii_m, clamp=found["clamp"])
@@ -164,19 +171,25 @@ def identify(
     """
     how = {
         "method": method,
-        "seed": seed,
-        "length_m": length_m,
-        "lead_mass_kg": lead_mass_kg,
-        "threads": threads,
+        "seed": whole("seed", seed, 0),
+        "length_m": None if length_m is None else number("length_m", length_m),
+        "lead_mass_kg": None if lead_mass_kg is None else number("lead_mass_kg", lead_mass_kg),
+        "threads": whole("threads", threads, 1),
         "config": config,
     }
+    if not isinstance(keypoints, Track) and not os.path.exists(keypoints):
+        words = f"`{os.fspath(keypoints)}` does not exist"
+        raise _wag.InputError(f"{words}: name a run's folder, or keypoints as `wag track` writes them")
     if not isinstance(keypoints, Track) and os.path.isdir(keypoints):
         if camera is not None or motion is not None:
             words = f"`{os.fspath(keypoints)}` is a run, which tells camera and motion itself"
             raise _wag.InputError(f"{words}: leave these out")
-        found, unconfirmed = _wag.identify_run(keypoints, how, cell)
-        _confirm(unconfirmed, accept_unconfirmed)
+        found, unconfirmed = _wag.identify_run(keypoints, how, accept_unconfirmed, cell)
+        if found is None:
+            _confirm(unconfirmed, False)
         return Estimate._of(found, unconfirmed)
+    if cell is not None:
+        raise _wag.InputError("`cell` is for a run: give it to the motion instead")
     if camera is None or motion is None:
         raise _wag.InputError("name camera and motion: only a run's folder tells them itself")
     given = keypoints if isinstance(keypoints, Track) else Track.load(keypoints)

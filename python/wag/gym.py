@@ -8,7 +8,8 @@
 ``wag/Throw-v0`` is the planner's own task. An action holds three waypoints of the joints 2, 4
 and 6 and the times between them; an episode is one throw, and its reward minus the lead's
 distance (m) from the target where it comes nearest. ``wag/Swing-v0`` moves the same joints by
-accelerations, 50 times a second. Ropes and targets are drawn anew for every episode.
+accelerations, 50 times a second. Ropes and targets are drawn anew for every episode, but where
+`reset` is given `options` with ``ropes``, (envs, 9), or ``targets_m``, (envs, 3).
 """
 
 from __future__ import annotations
@@ -21,8 +22,10 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from . import _wag
 from ._wag import START_RAD, Motion, ranges_rad
-from .rope import PARAMETERS, Floats
+from .given import Floats, numbers, positive, whole
+from .rope import PARAMETERS
 from .simulation import THREADS, HangingRopes, simulate
 
 MOVED = (1, 3, 5)
@@ -40,11 +43,19 @@ class _Trials:
     """Ropes and targets of as many episodes as are asked for."""
 
     def __init__(self, rng: np.random.Generator, count: int) -> None:
-        self.ropes = rng.uniform(LOW, HIGH, size=(count, len(PARAMETERS)))
+        seeds = rng.integers(2**63, size=count).tolist()
+        self.ropes = np.array([_wag.random_rope(seed) for seed in seeds])
         self.ropes[:, 0] = np.round(self.ropes[:, 0])
-        rho, bearing = rng.uniform(0.8, 1.1, count), np.radians(rng.uniform(-35.0, 35.0, count))
-        height = rng.uniform(-0.2, 0.7, count)
-        self.targets_m = np.stack([rho * np.cos(bearing), rho * np.sin(bearing), height], axis=1)
+        self.targets_m = np.array([_wag.random_target(seed) for seed in seeds])
+
+    def given(self, options: dict[str, Any] | None) -> _Trials:
+        """The same with ropes and targets that a caller of `reset` chose."""
+        options, count = dict(options or {}), len(self.ropes)
+        self.ropes = numbers("ropes", options.pop("ropes", self.ropes), (count, len(PARAMETERS)))
+        self.targets_m = numbers("targets_m", options.pop("targets_m", self.targets_m), (count, 3))
+        if options:
+            raise _wag.InputError(f"options are `ropes` and `targets_m`, not {', '.join(options)}")
+        return self
 
     def context(self) -> Floats:
         """Parameters and targets, each from -1 to 1, (trials, 12)."""
@@ -53,18 +64,28 @@ class _Trials:
         return np.clip(np.concatenate([ropes, targets], axis=1), -1.0, 1.0)
 
 
+def _actions(envs: VectorEnv, actions: Any) -> Floats:
+    """One action for each environment, once these were reset."""
+    if not hasattr(envs, "_trials"):
+        raise gymnasium.error.ResetNeeded("call reset() before step()")
+    return numbers("actions", actions, envs.action_space.shape)
+
+
 class ThrowVectorEnv(VectorEnv):
     """Whole throws at targets, all simulated in one call.
 
     Action, 12 numbers from -1 to 1: three waypoints of the joints 2, 4 and 6, as offsets of up
     to `reach_rad` from the start pose, joint 1 turned to the target's bearing; then the three
     times between them, 0.15 to 0.6 s. A throw faster than the arm's limits is slowed down as a
-    whole; one that leaves a joint's range is not thrown and misses by a metre.
+    whole; what comes later than `HORIZON_S` does not count. One that leaves a joint's range is not
+    thrown: its miss is `NOT_THROWN_M`, more than any throw's.
 
     `info`: ``distance_m``, ``time_s`` and ``slowed``, how much a throw was slowed.
     """
 
     WAYPOINTS = 3
+    HORIZON_S = 2.5
+    NOT_THROWN_M = 3.0
 
     def __init__(
         self,
@@ -75,8 +96,9 @@ class ThrowVectorEnv(VectorEnv):
         precision: str = "f32",
         threads: int = THREADS,
     ) -> None:
-        self.num_envs, self.reach_rad = num_envs, reach_rad
-        self.step_s, self.precision, self.threads = step_s, precision, threads
+        self.num_envs = num_envs = whole("num_envs", num_envs, 1)
+        self.reach_rad, self.step_s = positive("reach_rad", reach_rad), positive("step_s", step_s)
+        self.precision, self.threads = precision, whole("threads", threads, 1)
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
         size = self.WAYPOINTS * (len(MOVED) + 1)
         self.single_action_space = spaces.Box(-1.0, 1.0, (size,), np.float32)
@@ -85,10 +107,10 @@ class ThrowVectorEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
         super().reset(seed=seed, options=options)
-        self._trials = _Trials(self.np_random, self.num_envs)
+        self._trials = _Trials(self.np_random, self.num_envs).given(options)
         return self._observed(), {}
 
     def _observed(self) -> np.ndarray:
@@ -96,7 +118,7 @@ class ThrowVectorEnv(VectorEnv):
 
     def throws(self, actions: np.ndarray) -> tuple[Floats, Floats]:
         """Times (throws, 4) in s and joints (throws, 4, 7) in rad that actions ask for."""
-        actions = np.clip(np.asarray(actions, dtype=float), -1.0, 1.0)
+        actions = np.clip(_actions(self, actions), -1.0, 1.0)
         split = self.WAYPOINTS * len(MOVED)
         offsets = self.reach_rad * actions[:, :split].reshape(-1, self.WAYPOINTS, len(MOVED))
         q_rad = np.tile(START, (self.num_envs, self.WAYPOINTS + 1, 1))
@@ -114,22 +136,24 @@ class ThrowVectorEnv(VectorEnv):
         found = simulate(
             self._trials.ropes,
             motions,
-            horizon_s=max(m.duration_s for m in motions) + 0.3,
+            horizon_s=self.HORIZON_S,
             point_m=self._trials.targets_m,
             step_s=self.step_s,
             precision=self.precision,
             threads=self.threads,
         )
         near = found.point
-        distance_m = np.where(is_within & ~found.diverged, near.distance_m, 1.0)
+        thrown = is_within & ~found.diverged
+        distance_m = np.where(thrown, near.distance_m, self.NOT_THROWN_M)
         final, self._trials = self._trials, _Trials(self.np_random, self.num_envs)
         infos = {
             "distance_m": distance_m,
-            "time_s": near.time_s,
+            "time_s": np.where(thrown, near.time_s, self.HORIZON_S),
             "slowed": slowed,
             "final_obs": final.context().astype(np.float32),
         }
         ended = np.ones(self.num_envs, dtype=bool)
+        infos |= {f"_{name}": ended.copy() for name in infos}
         return self._observed(), -distance_m, ended, np.zeros_like(ended), infos
 
 
@@ -139,7 +163,8 @@ class SwingVectorEnv(VectorEnv):
     Action, 3 numbers from -1 to 1: accelerations of the joints 2, 4 and 6, in parts of
     `qdd_max_rad_s2`; what would leave `qd_max_rad_s` or the joints' ranges brakes instead.
     Observation: positions and velocities of these joints, the lead's place relative to the
-    target and its velocity, the rope's parameters and the target. The reward of all steps
+    target and its velocity, in the plane that joint 1 has turned to the target, the rope's parameters
+    and the target, in the world. The reward of all steps
     together is minus the least distance (m) of the episode, which lasts 2 s.
     """
 
@@ -154,8 +179,10 @@ class SwingVectorEnv(VectorEnv):
         step_s: float = 1e-3,
         threads: int = THREADS,
     ) -> None:
-        self.num_envs, self.threads, self.step_s = num_envs, threads, step_s
-        self.qd_max_rad_s, self.qdd_max_rad_s2 = qd_max_rad_s, qdd_max_rad_s2
+        self.num_envs = num_envs = whole("num_envs", num_envs, 1)
+        self.threads, self.step_s = whole("threads", threads, 1), positive("step_s", step_s)
+        self.qd_max_rad_s = positive("qd_max_rad_s", qd_max_rad_s)
+        self.qdd_max_rad_s2 = positive("qdd_max_rad_s2", qdd_max_rad_s2)
         self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}
         self.single_action_space = spaces.Box(-1.0, 1.0, (len(MOVED),), np.float32)
         size = 2 * len(MOVED) + 6 + len(PARAMETERS) + 3
@@ -164,11 +191,11 @@ class SwingVectorEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
         super().reset(seed=seed, options=options)
         count = self.num_envs
-        self._trials = _Trials(self.np_random, count)
+        self._trials = _Trials(self.np_random, count).given(options)
         self._hanging = HangingRopes(
             self._trials.ropes, START, step_s=self.step_s, threads=self.threads
         )
@@ -213,9 +240,10 @@ class SwingVectorEnv(VectorEnv):
 
     def _allowed(self, actions: np.ndarray) -> Floats:
         """Accelerations of all joints that keep speeds and ranges, (envs, 7) in rad/s²."""
+        asked = np.clip(_actions(self, actions), -1.0, 1.0)
         q, qd = (joints[:, MOVED] for joints in self._hanging.joints())
         most = self.qdd_max_rad_s2
-        wanted = most * np.clip(np.asarray(actions, dtype=float), -1.0, 1.0)
+        wanted = most * asked
         up = np.minimum(self.qd_max_rad_s, self._fastest(UPPER - q, qd))
         down = np.minimum(self.qd_max_rad_s, self._fastest(q - LOWER, -qd))
         bounded = np.clip(wanted, (-down - qd) / self.PERIOD_S, (up - qd) / self.PERIOD_S)
@@ -226,9 +254,10 @@ class SwingVectorEnv(VectorEnv):
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, Floats, np.ndarray, np.ndarray, dict[str, Any]]:
+        allowed = self._allowed(actions)
         anew = np.flatnonzero(self._ended)
         before = self._least_m.copy()
-        self._tips_m = self._hanging.advance(self._allowed(actions), self.PERIOD_S, self.SAMPLES)
+        self._tips_m = self._hanging.advance(allowed, self.PERIOD_S, self.SAMPLES)
         far_m = np.linalg.norm(self._tips_m - self._targets_m()[:, None], axis=2).min(axis=1)
         self._least_m = np.fmin(self._least_m, far_m)
         self._steps += 1
@@ -244,7 +273,9 @@ class SwingVectorEnv(VectorEnv):
         terminated = ~self._hanging.finite()
         truncated = (self._steps >= self.STEPS) & ~terminated
         self._ended = terminated | truncated
-        return self._observed(), rewards, terminated, truncated, {"distance_m": self._least_m.copy()}
+        every = np.ones(self.num_envs, dtype=bool)
+        infos = {"distance_m": self._least_m.copy(), "_distance_m": every}
+        return self._observed(), rewards, terminated, truncated, infos
 
 
 class _One(gymnasium.Env):
@@ -264,15 +295,16 @@ class _One(gymnasium.Env):
         # Further episodes go on in the random numbers of the seed.
         if seed is not None or not hasattr(self._all, "_trials"):
             start = int(self.np_random.integers(2**31))
-            observed, _ = self._all.reset(seed=start)
+            observed, _ = self._all.reset(seed=start, options=options)
         else:
-            observed, _ = self._all.reset()
+            observed, _ = self._all.reset(options=options)
         return observed[0], {}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         observed, rewards, terminated, truncated, infos = self._all.step(np.asarray(action)[None])
         seen = infos.pop("final_obs", observed)
-        info = {name: float(values[0]) for name, values in infos.items()}
+        told = {name: values for name, values in infos.items() if not name.startswith("_")}
+        info = {name: float(values[0]) for name, values in told.items()}
         return seen[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), info
 
 

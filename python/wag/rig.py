@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import weakref
 from collections.abc import Sequence
 from types import TracebackType
 
 from . import _wag
+from .given import whole
 from .rope import Rope
 
 PathLike = str | os.PathLike[str]
@@ -39,14 +41,16 @@ class Rig:
         task: where the camera stands: "strike", "lob" or "drape".
         command_port, report_ports: any free ones where they are 0.
         """
+        if task not in ("strike", "lob", "drape"):
+            raise _wag.InputError(f"`task` is {task!r}, but must be 'strike', 'lob' or 'drape'")
         self._camera = camera
         self._setup = {
-            "seed": seed,
+            "seed": whole("seed", seed, 0),
             "rope": None if rope is None else rope.to_json(),
             "camera": camera,
             "task": task,
-            "command_port": command_port,
-            "report_ports": list(report_ports),
+            "command_port": whole("command_port", command_port, 0, 65535),
+            "report_ports": [whole("report_ports", port, 0, 65535) for port in report_ports],
             "cell": cell,
         }
         self._rig: _wag.Rig | None = None
@@ -55,6 +59,8 @@ class Rig:
         """Starts it; the arm listens when this returns."""
         if self._rig is None:
             self._rig = _wag.Rig(self._setup)
+            # Nothing of it stays in shared memory, however the interpreter ends.
+            weakref.finalize(self, self._rig.stop)
         return self
 
     def stop(self) -> None:

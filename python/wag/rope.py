@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _wag
-
-Floats = npt.NDArray[np.float64]
+from .given import Floats, numbers, whole
 
 
 class Parameter(NamedTuple):
@@ -28,6 +27,9 @@ class Parameter(NamedTuple):
 
 PARAMETERS: tuple[Parameter, ...] = tuple(Parameter(*p) for p in _wag.parameters())
 """The parameters in the order of every array of them."""
+
+
+PARAMETERS_KEYS = tuple(p.key for p in PARAMETERS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,12 +57,15 @@ class Rope:
     @classmethod
     def random(cls, seed: int) -> Rope:
         """A rope drawn from the ranges of :data:`PARAMETERS`."""
-        return cls.from_array(_wag.random_rope(seed))
+        return cls.from_array(_wag.random_rope(whole("seed", seed, 0)))
 
     @classmethod
     def from_array(cls, parameters: npt.ArrayLike) -> Rope:
         """From nine numbers in the order of :data:`PARAMETERS`; links are rounded."""
-        links, *others = np.asarray(parameters, dtype=float).tolist()
+        found = numbers("parameters", parameters, (len(PARAMETERS),))
+        if not np.isfinite(found).all():
+            raise _wag.InputError(f"`parameters` must be finite, found {found}")
+        links, *others = found.tolist()
         return cls(round(links), *others)
 
     @classmethod
@@ -74,10 +79,12 @@ class Rope:
 
     def array(self) -> Floats:
         """The nine parameters, without the extras."""
-        return np.array([getattr(self, p.key) for p in PARAMETERS], dtype=float)
+        values = [getattr(self, key) for key in PARAMETERS_KEYS]
+        return numbers("rope", values, (len(PARAMETERS),))
 
     def to_json(self) -> str:
-        return json.dumps(dataclasses.asdict(self))
+        kept: dict[str, Any] = dict(zip(PARAMETERS_KEYS, self.array().tolist(), strict=True))
+        return json.dumps(kept | {"links": whole("links", self.links, 1), "extras": self.extras})
 
 
 def tabled(ropes: Rope | Sequence[Rope] | npt.ArrayLike) -> tuple[Floats, list[str | None]]:
@@ -88,9 +95,10 @@ def tabled(ropes: Rope | Sequence[Rope] | npt.ArrayLike) -> tuple[Floats, list[s
         table = np.array([rope.array() for rope in ropes]).reshape(-1, len(PARAMETERS))
         extras = [json.dumps(rope.extras) if rope.extras else None for rope in ropes]
         return table, extras if any(extras) else []
-    return np.atleast_2d(np.ascontiguousarray(ropes, dtype=float)), []
+    table = numbers("ropes", ropes, (None, len(PARAMETERS)), (len(PARAMETERS),))
+    return np.atleast_2d(table), []
 
 
 def random_target(seed: int) -> Floats:
     """A target of a strike, (3,) in m, that every rope of the ranges reaches."""
-    return np.array(_wag.random_target(seed))
+    return np.array(_wag.random_target(whole("seed", seed, 0)))

@@ -11,12 +11,13 @@ import numpy.typing as npt
 
 from . import _wag
 from ._wag import Motion
-from .rope import Floats, Rope, tabled
+from .given import Floats, number, numbers, whole
+from .rope import Rope, tabled
 
 THREADS = os.cpu_count() or 1
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Approach:
     """Where each rope's lead came nearest; NaN for a rope whose simulation diverged."""
 
@@ -30,7 +31,7 @@ class Approach:
     """(ropes, 3)"""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Simulation:
     """What was simulated; what was not asked for is None or empty."""
 
@@ -40,7 +41,9 @@ class Simulation:
     """Ropes that were simulated again at a quarter of the step, (ropes,)."""
     peak_tip_speed_m_s: Floats
     nodes_m: list[npt.NDArray[np.floating]]
-    """Of each rope (frames, links + 1, 3), clamp first; not copied from the simulator."""
+    """Of each rope (frames, links + 1, 3), clamp first; without a copy, NaN where it diverged.
+
+    Without `rate_hz` there are no frames."""
     point: Approach | None = None
     segment: Approach | None = None
     highest_m: Floats | None = None
@@ -52,6 +55,8 @@ class Simulation:
 
     def tips_m(self) -> npt.NDArray[np.floating]:
         """The leads' centres, (ropes, frames, 3)."""
+        if not self.nodes_m:
+            return np.zeros((0, 0, 3))
         return np.stack([nodes[:, -1] for nodes in self.nodes_m])
 
 
@@ -73,7 +78,8 @@ def simulate(
     """Simulates every rope, all under one motion or each under its own.
 
     ropes: one, several, or a table of shape (ropes, 9).
-    horizon_s: simulated time; the longest motion's without it.
+    horizon_s: simulated time; the longest motion's without it. The rope swings on when a throw has
+        ended, and often hits only then: see `Plan.horizon_s`.
     rate_hz: keeps all nodes at this rate from t = 0 on.
     point_m, segment_m: measure the lead's closest approach, between steps too; a point may be
         one for all, (3,), or each rope's own, (ropes, 3).
@@ -81,7 +87,7 @@ def simulate(
     precision: "f32" is twice as fast, and errs by micrometres.
     straight_rad: rotation of a straight rope at the start; it hangs still without it.
 
-    The interpreter's lock is released meanwhile; results do not depend on `threads`.
+    The interpreter's lock is released meanwhile; Ctrl-C counts when all ropes are simulated; results do not depend on `threads`.
     """
     motions = [motion] if isinstance(motion, Motion) else list(motion)
     if horizon_s is None:
@@ -89,17 +95,25 @@ def simulate(
     if precision not in ("f32", "f64"):
         raise _wag.InputError(f"`precision` is {precision!r}, but must be 'f32' or 'f64'")
     table, extras = tabled(ropes)
-    points = None if point_m is None else np.atleast_2d(np.ascontiguousarray(point_m, dtype=float))
+    points = None
+    if point_m is not None:
+        points = np.atleast_2d(numbers("point_m", point_m, (3,), (None, 3)))
+    if segment_m is not None:
+        segment_m = numbers("segment_m", segment_m, (2, 3)).tolist()
+    if straight_rad is not None:
+        straight_rad = numbers("straight_rad", straight_rad, (3,)).tolist()
+    if number("horizon_s", horizon_s) <= 0.0:
+        raise _wag.InputError(f"`horizon_s` is {horizon_s}, but must be above 0")
     wanted = {
-        "horizon_s": horizon_s,
-        "step_s": step_s,
+        "horizon_s": float(horizon_s),
+        "step_s": number("step_s", step_s),
         "single_precision": precision == "f32",
         "straight_rad": straight_rad,
-        "rate_hz": rate_hz,
-        "segment_m": None if segment_m is None else np.asarray(segment_m, dtype=float).tolist(),
-        "height": height,
-        "rest_window_s": rest_window_s,
-        "threads": threads,
+        "rate_hz": None if rate_hz is None else number("rate_hz", rate_hz),
+        "segment_m": segment_m,
+        "height": bool(height),
+        "rest_window_s": None if rest_window_s is None else number("rest_window_s", rest_window_s),
+        "threads": whole("threads", threads, 1),
     }
     found = _wag.simulate(table, extras, motions, points, wanted)
     for name in ("point", "segment"):
@@ -125,23 +139,30 @@ class HangingRopes:
         threads: int = THREADS,
     ) -> None:
         table, extras = tabled(ropes)
-        self._q_rad = np.ascontiguousarray(q_rad, dtype=float)
+        self._q_rad = numbers("q_rad", q_rad, (7,))
         self._ropes = _wag.HangingRopes(
-            table, extras, self._q_rad, step_s=step_s, threads=threads, cell=cell
+            table,
+            extras,
+            self._q_rad,
+            step_s=number("step_s", step_s),
+            threads=whole("threads", threads, 1),
+            cell=cell,
         )
 
     def replace(self, indices: Sequence[int], ropes: Sequence[Rope] | npt.ArrayLike) -> None:
         """Hangs other ropes in the place of some, with their arms back at the start."""
         table, extras = tabled(ropes)
-        self._ropes.replace([int(i) for i in indices], table, extras, self._q_rad)
+        places = [whole("indices", i, 0) for i in indices]
+        self._ropes.replace(places, table, extras, self._q_rad)
 
     def advance(self, qdd_rad_s2: npt.ArrayLike, period_s: float, samples: int = 1) -> Floats:
         """Moves all on by `period_s` under constant accelerations of their joints, (ropes, 7).
 
         Gives the leads' centres after each of `samples` equal parts, (ropes, samples, 3).
         """
-        qdd = np.ascontiguousarray(qdd_rad_s2, dtype=float)
-        return self._ropes.advance(qdd, period_s, samples)
+        qdd = numbers("qdd_rad_s2", qdd_rad_s2, (None, 7))
+        samples = whole("samples", samples, 1)
+        return self._ropes.advance(qdd, number("period_s", period_s), samples)
 
     def joints(self) -> tuple[Floats, Floats]:
         """Positions and velocities of all arms' joints, (ropes, 7) each."""
@@ -149,7 +170,7 @@ class HangingRopes:
 
     def nodes_m(self, index: int) -> Floats:
         """Nodes of one rope now, (links + 1, 3), clamp first."""
-        return self._ropes.nodes(index)
+        return self._ropes.nodes(whole("index", index, 0))
 
     def finite(self) -> npt.NDArray[np.bool_]:
         """Which ropes' simulations have not blown up, (ropes,)."""

@@ -11,13 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _wag
-from ._wag import Motion
+from ._wag import FailedError, Motion
 from .film import Estimate, PathLike, UnconfirmedError
-from .rope import Floats, Rope
+from .given import Floats, numbers, whole
+from .rope import Rope
 from .simulation import THREADS
 
 
-@dataclasses.dataclass(frozen=True)
+AFTER_S = 0.5
+"""So long after a throw its rope is looked at."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Plan:
     """A checked throw: a clamped cubic spline through joint waypoints, from rest to rest."""
 
@@ -29,27 +34,39 @@ class Plan:
     waypoints_rad: Floats
     """(waypoints, 7)"""
     predicted_error_m: float
+    """The task's own error, of the simulation with what the task puts there, a board or a wall."""
     predicted_time_s: float
     success: bool
     """Whether the simulated throw does what the task asks."""
     forecast: dict[str, Any] | None
     """Error to expect of a rope that is only known as well as it was identified."""
     warnings: list[str]
+    shortcoming: str | None
+    """Why it should not be thrown, if so."""
     details: dict[str, Any]
     """Everything, as ``plan.json`` holds it."""
+    cell: PathLike | None = None
+    """The cell file that it was planned with; built in without one."""
 
     @property
     def duration_s(self) -> float:
         return float(self.times_s[-1])
 
-    def motion(self, cell: PathLike | None = None) -> Motion:
-        """The clamp's motion under an arm that follows the plan exactly."""
-        return Motion.waypoints(self.times_s, self.waypoints_rad, cell=cell)
+    @property
+    def horizon_s(self) -> float:
+        """Until when to simulate it: the rope swings on, and often hits, when the arm stands."""
+        return self.duration_s + AFTER_S
 
-    def save(self, path: PathLike) -> None:
-        """Writes the ``plan.json`` that `wag throw` takes."""
-        with open(path, "w", encoding="utf-8") as file:
-            json.dump(self.details, file, indent=2)
+    def motion(self, cell: PathLike | None = None) -> Motion:
+        """The clamp's motion under an arm that follows the plan exactly, in the plan's own cell."""
+        return Motion.waypoints(self.times_s, self.waypoints_rad, cell=cell or self.cell)
+
+    def save(self, path: PathLike, *, allow_miss: bool = False) -> None:
+        """Writes the ``plan.json`` that `wag throw` takes; a plan with a shortcoming only if told so."""
+        if self.shortcoming is not None and not allow_miss:
+            words = f"{self.shortcoming}; `{os.fspath(path)}` is not written"
+            raise FailedError(f"{words}, allow_miss=True would write it")
+        _wag.write_text(path, json.dumps(self.details, indent=2))
 
 
 def plan(
@@ -78,6 +95,10 @@ def plan(
     posterior, unconfirmed = None, []
     if isinstance(rope, Estimate):
         posterior, unconfirmed, rope = rope.details["posterior"], rope.unconfirmed, rope.rope
+    elif isinstance(rope, np.ndarray):
+        rope = Rope.from_array(rope)
+    elif not isinstance(rope, (str, os.PathLike, Rope)):
+        raise _wag.InputError(f"`rope` is a {type(rope).__name__}, but must be a Rope, an Estimate or a file")
     elif not isinstance(rope, Rope):
         read = json.loads(_wag.read_rope(os.fspath(rope)))
         posterior, unconfirmed, rope = read["posterior"], read["unconfirmed"], Rope(**read["rope"])
@@ -87,15 +108,15 @@ def plan(
     if robust and posterior is None:
         raise _wag.InputError("`robust` needs an identified rope: a known one is no other")
     given = {
-        "seed": seed,
-        "robust": robust,
+        "seed": whole("seed", seed, 0),
+        "robust": whole("robust", robust, 0),
         "limits": limits,
         "cell": cell,
         "config": config,
         "arm_response": arm_response,
-        "threads": threads,
+        "threads": whole("threads", threads, 1),
     }
-    target = np.asarray(target_m, dtype=float).tolist()
+    target = numbers("target_m", target_m, (3,)).tolist()
     kept = None if posterior is None else json.dumps(posterior)
     found = json.loads(_wag.plan(task, rope.to_json(), kept, target, given))
     made = found["plan"] | {"unconfirmed": list(unconfirmed)}
@@ -110,5 +131,7 @@ def plan(
         success=made["verdict"]["success"],
         forecast=made["forecast"],
         warnings=found["warnings"],
+        shortcoming=found["shortcoming"],
         details=made,
+        cell=cell,
     )

@@ -9,6 +9,7 @@ const SHARDS_MAX: u64 = 100_000;
 
 /// Every `of`-th trial, from trial `number - 1` on: shards of equal length and of equal work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct Shard {
     /// Which shard, from 1.
     pub number: u64,
@@ -48,6 +49,20 @@ impl fmt::Display for Shard {
     }
 }
 
+impl TryFrom<String> for Shard {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<Shard> for String {
+    fn from(shard: Shard) -> Self {
+        shard.to_string()
+    }
+}
+
 impl FromStr for Shard {
     type Err = String;
 
@@ -84,6 +99,9 @@ mod tests {
     #[test]
     fn what_is_no_shard_is_told() {
         assert_eq!("3/8".parse(), Ok(Shard { number: 3, of: 8 }));
+        let read = serde_json::from_str::<Shard>;
+        assert_eq!(read("\"3/8\"").unwrap(), Shard { number: 3, of: 8 });
+        assert!(read("\"4/3\"").is_err() && read("\"0/3\"").is_err());
         for text in ["0/8", "9/8", "1", "a/b", "1/0", "-1/2", "1/100001"] {
             let refusal = text.parse::<Shard>().unwrap_err();
             assert!(refusal.contains("2/8 is the second of eight"), "{refusal}");

@@ -29,6 +29,9 @@ pub struct SubmitArgs {
     /// Threads, and so processors, of a shard.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: u16,
+    /// Write the script that makes a shard, and start none: for a cluster's queue.
+    #[arg(long)]
+    pub prepare: bool,
     /// How often shards that failed are tried again.
     #[arg(long, default_value_t = 2)]
     pub retries: u32,

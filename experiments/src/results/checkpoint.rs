@@ -22,13 +22,20 @@ pub(super) struct Origin {
     /// Seed of ropes, films and searches.
     pub seed: u64,
     pub method: String,
+    /// Hash of the network that is asked, if one is.
+    pub network: Option<String>,
     /// Trials of the whole study.
     pub count: u64,
 }
 
 impl Origin {
     /// Of trials that this program makes on this processor.
-    pub(super) fn here(name: &str, seed: u64, method: String, count: u64) -> anyhow::Result<Self> {
+    pub(super) fn here(
+        name: &str,
+        (seed, method): (u64, String),
+        network: Option<String>,
+        count: u64,
+    ) -> anyhow::Result<Self> {
         let kernels = [Precision::F32, Precision::F64].map(Precision::fastest_kernel);
         Ok(Self {
             name: name.to_owned(),
@@ -36,6 +43,7 @@ impl Origin {
             kernels: format!("{kernels:?}"),
             seed,
             method,
+            network,
             count,
         })
     }
@@ -60,8 +68,13 @@ impl<T: Serialize + DeserializeOwned> Checkpoint<T> {
             return Ok(empty);
         };
         let found: Self = read(path)?;
-        // A study may be made longer; trials that are too many are left out.
-        let Origin { count, .. } = empty.origin;
+        // A whole study may be made longer; trials that are too many are left out. A shard's other
+        // trials belong to other shards then.
+        let count = if empty.shard.is_whole() {
+            empty.origin.count
+        } else {
+            found.origin.count
+        };
         let as_long = Origin {
             count,
             ..found.origin.clone()
@@ -74,12 +87,14 @@ impl<T: Serialize + DeserializeOwned> Checkpoint<T> {
         }
         let (of, shard) = (found.origin, found.shard);
         Err(anyhow!(
-            "is of `{}`, program {}, kernels {}, seed {}, method {}, shard {shard}: name another file with --out, or remove it",
+            "is of `{}`, program {}, kernels {}, seed {}, method {}, network {}, shard {shard} of {} trials: name another file with --out, or remove it",
             of.name,
             of.program,
             of.kernels,
             of.seed,
-            of.method
+            of.method,
+            of.network.as_deref().unwrap_or("none"),
+            of.count
         ))
         .with_context(|| format!("result file `{}`", path.display()))
     }
@@ -91,7 +106,12 @@ impl<T: Serialize + DeserializeOwned> Checkpoint<T> {
 
 fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
     let text = files::read_text(path)?;
-    serde_json::from_str(&text).with_context(|| format!("result file `{}`", path.display()))
+    serde_json::from_str(&text).with_context(|| {
+        format!(
+            "`{}` is no result file of this version: name another file, or remove it",
+            path.display()
+        )
+    })
 }
 
 /// Writes the trials of all shards into one file, byte for byte as one process would have; how
@@ -108,7 +128,7 @@ pub fn merge(shards: &[PathBuf], out: &Path) -> anyhow::Result<u64> {
         let expected = origin.get_or_insert_with(|| one.origin.clone());
         ensure!(
             one.origin == *expected,
-            "{} is of another study, program, processor, seed, method or number of trials than `{}`",
+            "{} is of another study, program, processor, seed, method, network or number of trials than `{}`",
             name(),
             shards[0].display()
         );
@@ -167,7 +187,7 @@ mod tests {
 
     fn empty(seed: u64, count: u64, shard: Shard) -> Checkpoint<f64> {
         Checkpoint {
-            origin: Origin::here("sysid", seed, "hybrid".to_owned(), count).unwrap(),
+            origin: Origin::here("sysid", (seed, "hybrid".to_owned()), None, count).unwrap(),
             shard,
             trials: Vec::new(),
         }
@@ -186,6 +206,13 @@ mod tests {
         for other in [
             empty(2, 5, Shard::WHOLE),
             empty(1, 5, Shard { number: 1, of: 2 }),
+            Checkpoint {
+                origin: Origin {
+                    network: Some("abc".to_owned()),
+                    ..empty(1, 5, Shard::WHOLE).origin
+                },
+                ..empty(1, 5, Shard::WHOLE)
+            },
         ] {
             let error = format!("{:#}", open(other).unwrap_err());
             let told = error.contains("result.json") && error.contains("seed 1");

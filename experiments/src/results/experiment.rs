@@ -116,8 +116,10 @@ impl<'a> Experiment<'a> {
         let (out, shard) = (self.args.out.as_deref(), self.args.shard);
         let count = shard.len(sequence.count);
         let (name, seed, method) = (self.name, self.args.seed, sequence.method);
+        let network = self.rig.network.as_ref();
+        let network = network.map(|net| net.metadata().graph_sha256.clone());
         let empty = Checkpoint {
-            origin: Origin::here(name, seed, method, sequence.count).or_failed()?,
+            origin: Origin::here(name, (seed, method), network, sequence.count).or_failed()?,
             shard,
             trials: Vec::new(),
         };

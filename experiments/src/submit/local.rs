@@ -2,39 +2,40 @@
 
 use crate::args::SubmitArgs;
 use anyhow::Context;
+use rustix::process::{Pid, Signal, kill_process_group};
+use std::collections::VecDeque;
 use std::fs::File;
-use std::path::Path;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// Processes of this machine, so many at once.
-#[derive(Debug, Default)]
+/// Processes of this machine, so many at once, each in a group of its own. Dropped, they are
+/// told to end, and waited for: they keep what they have made.
+#[derive(Debug)]
 pub struct Local {
-    waiting: Vec<Command>,
-    running: Vec<Child>,
+    script: PathBuf,
     workers: usize,
+    waiting: VecDeque<u64>,
+    running: Vec<Child>,
 }
 
 impl Local {
-    /// Hands over shards, each to be made by the script with its number.
-    pub fn submit(
-        &mut self,
-        script: &Path,
-        shards: &[u64],
-        args: &SubmitArgs,
-    ) -> anyhow::Result<()> {
-        self.workers = usize::try_from(args.workers)?;
-        for number in shards.iter().rev() {
-            let log = script.with_file_name(format!("shard-{number}.log"));
-            let log = File::create(&log).with_context(|| format!("`{}`", log.display()))?;
-            let mut command = Command::new(script);
-            command.arg(number.to_string()).stdin(Stdio::null());
-            command.stdout(log.try_clone()?).stderr(log);
-            self.waiting.push(command);
-        }
-        self.start()
+    /// For shards that the script makes, given their numbers.
+    pub fn new(script: &Path, args: &SubmitArgs) -> anyhow::Result<Self> {
+        Ok(Self {
+            script: script.to_owned(),
+            workers: usize::try_from(args.workers)?,
+            waiting: VecDeque::new(),
+            running: Vec::new(),
+        })
     }
 
-    /// Whether nothing of what was handed over is left to do, well or badly done.
+    /// Hands over shards.
+    pub fn submit(&mut self, shards: &[u64]) {
+        self.waiting.extend(shards);
+    }
+
+    /// Starts what there is room for; whether nothing is left to do, well or badly done.
     pub fn is_over(&mut self) -> anyhow::Result<bool> {
         let mut left = Vec::new();
         for mut child in self.running.drain(..) {
@@ -43,27 +44,36 @@ impl Local {
             }
         }
         self.running = left;
-        self.start()?;
+        while self.running.len() < self.workers {
+            let Some(number) = self.waiting.pop_front() else {
+                break;
+            };
+            self.running.push(self.start(number)?);
+        }
         Ok(self.running.is_empty())
     }
 
-    /// Waits for what still runs, and starts no more: it was interrupted as this program was, and
-    /// keeps what it has made.
-    pub fn cancel(&mut self) {
-        self.waiting.clear();
+    fn start(&self, number: u64) -> anyhow::Result<Child> {
+        let path = self.script.with_file_name(format!("shard-{number}.log"));
+        let log = File::options().create(true).append(true).open(&path);
+        let log = log.with_context(|| format!("`{}`", path.display()))?;
+        let mut command = Command::new(&self.script);
+        command.arg(number.to_string()).process_group(0);
+        command.stdin(Stdio::null()).stdout(log.try_clone()?);
+        let child = command.stderr(log).spawn();
+        child.with_context(|| format!("cannot start `{}`", self.script.display()))
+    }
+}
+
+impl Drop for Local {
+    fn drop(&mut self) {
         for child in &mut self.running {
+            let group = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+            if let Some(group) = group {
+                // It may have ended by itself.
+                let _ = kill_process_group(group, Signal::TERM);
+            }
             let _ = child.wait();
         }
-    }
-
-    fn start(&mut self) -> anyhow::Result<()> {
-        while self.running.len() < self.workers {
-            let Some(mut command) = self.waiting.pop() else {
-                break;
-            };
-            let child = command.spawn().context("cannot start a shard")?;
-            self.running.push(child);
-        }
-        Ok(())
     }
 }

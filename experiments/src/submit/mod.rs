@@ -7,12 +7,15 @@
 mod local;
 
 use crate::args::SubmitArgs;
-use anyhow::Context;
+use crate::program::program;
+use anyhow::{Context, ensure};
 use cli_output::{OrInput, Outcome, Stage, is_interrupted, output, watch_interrupts};
 use local::Local;
+use rope_sim::Precision;
 use run_log::files;
 use serde_json::{Value, json};
 use shared_types::ipc::message::Progress;
+use std::fs::{File, Permissions};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -22,12 +25,14 @@ use std::time::Duration;
 /// How often marks are looked for.
 const LOOK: Duration = Duration::from_millis(500);
 /// Arguments that are this command's to give.
-const OWN: [&str; 3] = ["--out", "--shard", "--threads"];
+const OWN: [&str; 4] = ["--out", "--shard", "--threads", "--json"];
 
 /// The shards of a study in their folder.
 struct Shards {
     folder: PathBuf,
     count: u64,
+    /// Held: another submission of the same result would make them once more.
+    _lock: File,
 }
 
 impl Shards {
@@ -42,13 +47,16 @@ impl Shards {
 
     /// Those that are not made yet.
     fn missing(&self) -> Vec<u64> {
-        let all = 1..=self.count;
-        all.filter(|number| !self.mark(*number).exists()).collect()
+        let is_made = |number| self.mark(number).exists() && self.file(number).exists();
+        (1..=self.count)
+            .filter(|number| !is_made(*number))
+            .collect()
     }
 
     /// Writes the script that makes the shard whose number is its argument.
     fn write_script(&self, program: &Path, args: &SubmitArgs) -> anyhow::Result<PathBuf> {
         let quoted = |word: &str| format!("'{}'", word.replace('\'', r"'\''"));
+        let here = std::env::current_dir().context("the current folder")?;
         let study: Vec<String> = args.study.iter().map(|word| quoted(word)).collect();
         let text = format!(
             "#!/bin/sh\n\
@@ -56,9 +64,11 @@ impl Shards {
              set -eu\n\
              n=\"$1\"\n\
              folder={folder}\n\
+             cd {here}\n\
              {program} {study} --threads {threads} --shard \"$n/{count}\" --out \"$folder/shard-$n.json\"\n\
              : > \"$folder/shard-$n.done\"\n",
             folder = quoted(&self.folder.to_string_lossy()),
+            here = quoted(&here.to_string_lossy()),
             program = quoted(&program.to_string_lossy()),
             study = study.join(" "),
             threads = args.threads,
@@ -66,7 +76,7 @@ impl Shards {
         );
         let path = self.folder.join("shard.sh");
         files::write_atomic(&path, text.as_bytes())?;
-        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755))
+        std::fs::set_permissions(&path, Permissions::from_mode(0o755))
             .with_context(|| format!("`{}`", path.display()))?;
         Ok(path)
     }
@@ -74,20 +84,27 @@ impl Shards {
 
 /// Makes a study's shards and joins them; the value is what the study prints.
 pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
-    if let Some(own) = args.study.iter().find(|word| OWN.contains(&word.as_str())) {
+    let own = |word: &&String| OWN.contains(&word.split('=').next().unwrap_or_default());
+    if let Some(own) = args.study.iter().find(own) {
         return Err(bad_input!(
             "`{own}` after -- is this command's own: give it before --"
         ));
     }
     watch_interrupts().or_failed()?;
     files::check_writable(&args.out).or_input()?;
-    let program = std::env::current_exe()
-        .context("this program's own file")
-        .or_failed()?;
+    let own_file = std::env::current_exe().context("this program's own file");
+    let own_file = own_file.or_failed()?;
     let shards = open(args).or_input()?;
-    let script = shards.write_script(&program, args).or_failed()?;
-    let mut local = Local::default();
+    let script = shards.write_script(&own_file, args).or_failed()?;
     let stage = Stage::begin("submit");
+    if args.prepare {
+        let (count, script) = (shards.count, script.display());
+        stage.done(&format!("{count} shards, to be made by `{script} N`"));
+        return Ok(Some(json!({
+            "ok": true, "command": "submit", "shards": count, "script": script.to_string(),
+        })));
+    }
+    let mut local = Local::new(&script, args).or_failed()?;
     for round in 0..=args.retries {
         let missing = shards.missing();
         if missing.is_empty() {
@@ -96,7 +113,8 @@ pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
         if round > 0 {
             eprintln!("{} shards failed; they are tried again", missing.len());
         }
-        watch(&mut local, (&shards, &script, &missing), args, &stage)?;
+        local.submit(&missing);
+        watch(&mut local, &shards, &stage)?;
     }
     let missing = shards.missing();
     if let Some(first) = missing.first() {
@@ -112,66 +130,69 @@ pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
     let paths: Vec<PathBuf> = (1..=shards.count).map(|n| shards.file(n)).collect();
     let trials = crate::results::join(&paths, &args.out).or_failed()?;
     let seconds = stage.done(&format!("{trials} trials in {} shards", shards.count));
-    let result = print_result(&program, args)?;
+    let result = print_result(&own_file, args)?;
     Ok(Some(json!({
         "ok": true, "command": "submit", "shards": shards.count, "trials": trials,
         "seconds": seconds, "out": args.out, "folder": shards.folder, "result": result,
     })))
 }
 
-/// The folder of the shards; one that holds another number of them is refused.
+/// The folder of the shards; one that holds those of something else is refused.
 fn open(args: &SubmitArgs) -> anyhow::Result<Shards> {
-    let mut name = args
-        .out
-        .file_name()
-        .context("--out names no file")?
-        .to_owned();
+    let name = args.out.file_name().context("--out names no file")?;
+    let mut name = name.to_owned();
     name.push(".shards");
     let folder = args.out.with_file_name(name);
     let count = args.shards.unwrap_or(4 * u64::from(args.workers));
     files::create_folder(&folder)?;
     let folder = folder.canonicalize()?;
+    let lock = File::create(folder.join("lock")).context("the shards' lock")?;
+    ensure!(
+        lock.try_lock().is_ok(),
+        "another command makes the shards in `{}`: wait for it, or name another --out",
+        folder.display()
+    );
     let kept = folder.join("study.json");
-    let study = json!({ "study": args.study, "shards": count });
+    let kernels = [Precision::F32, Precision::F64].map(Precision::fastest_kernel);
+    let study = json!({
+        "study": args.study, "shards": count, "program": program()?,
+        "kernels": format!("{kernels:?}"),
+    });
     if kept.exists() {
         let found: Value = files::read_json(&kept)?;
-        anyhow::ensure!(
+        ensure!(
             found == study,
-            "`{}` holds shards of another study, or another number of them: name another --out, or remove it",
+            "`{}` holds shards of another study, program or processor, or another number of them: name another --out, or remove it",
             folder.display()
         );
     } else {
         files::write_json(&kept, &study)?;
     }
-    Ok(Shards { folder, count })
+    Ok(Shards {
+        folder,
+        count,
+        _lock: lock,
+    })
 }
 
-/// Starts shards and waits until they have ended.
-fn watch(
-    local: &mut Local,
-    (shards, script, missing): (&Shards, &Path, &[u64]),
-    args: &SubmitArgs,
-    stage: &Stage,
-) -> Outcome {
-    local.submit(script, missing, args).or_failed()?;
+/// Waits until all that was handed over has ended.
+fn watch(local: &mut Local, shards: &Shards, stage: &Stage) -> Outcome {
     loop {
-        let over = local.is_over().or_failed()?;
         let done = shards.count - shards.missing().len() as u64;
+        if is_interrupted() {
+            return Err(failed!(
+                "interrupted after {done} of {} shards; the same command goes on",
+                shards.count
+            ));
+        }
         stage.progress(&Progress {
             done: u32::try_from(done).unwrap_or(u32::MAX),
             total: u32::try_from(shards.count).unwrap_or(u32::MAX),
             value: done as f64,
             label: "shards".to_owned(),
         });
-        if over {
+        if local.is_over().or_failed()? {
             return Ok(());
-        }
-        if is_interrupted() {
-            local.cancel();
-            return Err(failed!(
-                "interrupted after {done} of {} shards; the same command goes on",
-                shards.count
-            ));
         }
         sleep(LOOK);
     }
@@ -181,13 +202,14 @@ fn watch(
 fn print_result(program: &Path, args: &SubmitArgs) -> Outcome<Value> {
     let mut command = Command::new(program);
     command.args(&args.study).arg("--out").arg(&args.out);
-    if output::is_json() {
+    let (status, printed) = if output::is_json() {
         let output = command.arg("--json").output().or_failed()?;
-        return serde_json::from_slice(&output.stdout).or_failed();
-    }
-    let status = command.status().or_failed()?;
+        (output.status, output.stdout)
+    } else {
+        (command.status().or_failed()?, b"null".to_vec())
+    };
     if !status.success() {
         return Err(failed!("the study could not print its result: {status}"));
     }
-    Ok(Value::Null)
+    serde_json::from_slice(&printed).or_failed()
 }
