@@ -62,6 +62,8 @@ impl Shards {
             "#!/bin/sh\n\
              # The shard of this number: shard.sh 3\n\
              set -eu\n\
+             # Told to end, it ends after the program, which keeps what it has made.\n\
+             trap : TERM\n\
              n=\"$1\"\n\
              folder={folder}\n\
              cd {here}\n\
