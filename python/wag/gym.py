@@ -71,6 +71,18 @@ def _actions(envs: VectorEnv, actions: Any) -> Floats:
     return numbers("actions", actions, envs.action_space.shape)
 
 
+def _describe(
+    envs: VectorEnv, mode: AutoresetMode, actions: int, observed: tuple[int, float]
+) -> None:
+    """Numbers of an action, from -1 to 1, and of an observation, with their bound."""
+    size, bound = observed
+    envs.metadata = {"autoreset_mode": mode, "render_modes": []}
+    envs.single_action_space = spaces.Box(-1.0, 1.0, (actions,), np.float32)
+    envs.single_observation_space = spaces.Box(-bound, bound, (size,), np.float32)
+    envs.action_space = batch_space(envs.single_action_space, envs.num_envs)
+    envs.observation_space = batch_space(envs.single_observation_space, envs.num_envs)
+
+
 class ThrowVectorEnv(VectorEnv):
     """Whole throws at targets, all simulated in one call.
 
@@ -96,15 +108,11 @@ class ThrowVectorEnv(VectorEnv):
         precision: str = "f32",
         threads: int = THREADS,
     ) -> None:
-        self.num_envs = num_envs = whole("num_envs", num_envs, 1)
+        self.num_envs = whole("num_envs", num_envs, 1)
         self.reach_rad, self.step_s = positive("reach_rad", reach_rad), positive("step_s", step_s)
         self.precision, self.threads = precision, whole("threads", threads, 1)
-        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
         size = self.WAYPOINTS * (len(MOVED) + 1)
-        self.single_action_space = spaces.Box(-1.0, 1.0, (size,), np.float32)
-        self.single_observation_space = spaces.Box(-1.0, 1.0, (len(PARAMETERS) + 3,), np.float32)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        _describe(self, AutoresetMode.SAME_STEP, size, (len(PARAMETERS) + 3, 1.0))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -179,16 +187,12 @@ class SwingVectorEnv(VectorEnv):
         step_s: float = 1e-3,
         threads: int = THREADS,
     ) -> None:
-        self.num_envs = num_envs = whole("num_envs", num_envs, 1)
+        self.num_envs = whole("num_envs", num_envs, 1)
         self.threads, self.step_s = whole("threads", threads, 1), positive("step_s", step_s)
         self.qd_max_rad_s = positive("qd_max_rad_s", qd_max_rad_s)
         self.qdd_max_rad_s2 = positive("qdd_max_rad_s2", qdd_max_rad_s2)
-        self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}
-        self.single_action_space = spaces.Box(-1.0, 1.0, (len(MOVED),), np.float32)
         size = 2 * len(MOVED) + 6 + len(PARAMETERS) + 3
-        self.single_observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float32)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        _describe(self, AutoresetMode.NEXT_STEP, len(MOVED), (size, np.inf))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -84,7 +84,7 @@ def simulate(
     point_m, segment_m: measure the lead's closest approach, between steps too; a point may be
         one for all, (3,), or each rope's own, (ropes, 3).
     step_s: 0.5 ms is exact to 0.3 mm at the tip in ordinary motions.
-    precision: "f32" is twice as fast, and errs by micrometres.
+    precision: "f32" is faster and less exact.
     straight_rad: rotation of a straight rope at the start; it hangs still without it.
 
     The interpreter's lock is released meanwhile; Ctrl-C counts when all ropes are simulated; results do not depend on `threads`.
