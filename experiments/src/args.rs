@@ -15,7 +15,7 @@ pub use mujoco::{
     ChannelName, ContactDynamicsArgs, MujocoArgs, OtherRealityArgs, RopeAccuracyArgs,
 };
 pub use shard::Shard;
-pub use submit::{MergeArgs, SubmitArgs};
+pub use submit::{EngineName, MergeArgs, SubmitArgs};
 
 /// Reproduce a result of the paper, or measure how fast this machine runs a part of the
 /// system, on simulated ropes.

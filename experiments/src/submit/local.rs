@@ -1,42 +1,43 @@
 //! Shards as processes of this machine.
 
+use super::engine::Engine;
+use super::shards::Shards;
 use crate::args::SubmitArgs;
 use anyhow::Context;
 use rustix::process::{Pid, Signal, kill_process_group};
 use std::collections::VecDeque;
 use std::fs::File;
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 /// Processes of this machine, so many at once, each in a group of its own. Dropped, they are
 /// told to end, and waited for: they keep what they have made.
 #[derive(Debug)]
 pub struct Local {
-    script: PathBuf,
     workers: usize,
     waiting: VecDeque<u64>,
     running: Vec<Child>,
 }
 
 impl Local {
-    /// For shards that the script makes, given their numbers.
-    pub fn new(script: &Path, args: &SubmitArgs) -> anyhow::Result<Self> {
-        Ok(Self {
-            script: script.to_owned(),
-            workers: usize::try_from(args.workers)?,
+    /// For shards of these arguments.
+    pub fn new(args: &SubmitArgs) -> Self {
+        Self {
+            workers: usize::try_from(args.workers).unwrap_or(usize::MAX),
             waiting: VecDeque::new(),
             running: Vec::new(),
-        })
+        }
+    }
+}
+
+impl Engine for Local {
+    fn submit(&mut self, _shards: &Shards, numbers: &[u64]) -> anyhow::Result<()> {
+        self.waiting.extend(numbers);
+        Ok(())
     }
 
-    /// Hands over shards.
-    pub fn submit(&mut self, shards: &[u64]) {
-        self.waiting.extend(shards);
-    }
-
-    /// Starts what there is room for; whether nothing is left to do, well or badly done.
-    pub fn is_over(&mut self) -> anyhow::Result<bool> {
+    /// Starts what there is room for, too.
+    fn is_over(&mut self, shards: &Shards) -> anyhow::Result<bool> {
         let mut left = Vec::new();
         for mut child in self.running.drain(..) {
             if child.try_wait()?.is_none() {
@@ -48,21 +49,21 @@ impl Local {
             let Some(number) = self.waiting.pop_front() else {
                 break;
             };
-            self.running.push(self.start(number)?);
+            self.running.push(start(shards, number)?);
         }
         Ok(self.running.is_empty())
     }
+}
 
-    fn start(&self, number: u64) -> anyhow::Result<Child> {
-        let path = self.script.with_file_name(format!("shard-{number}.log"));
-        let log = File::options().create(true).append(true).open(&path);
-        let log = log.with_context(|| format!("`{}`", path.display()))?;
-        let mut command = Command::new(&self.script);
-        command.arg(number.to_string()).process_group(0);
-        command.stdin(Stdio::null()).stdout(log.try_clone()?);
-        let child = command.stderr(log).spawn();
-        child.with_context(|| format!("cannot start `{}`", self.script.display()))
-    }
+fn start(shards: &Shards, number: u64) -> anyhow::Result<Child> {
+    let path = shards.log(number);
+    let log = File::options().create(true).append(true).open(&path);
+    let log = log.with_context(|| format!("`{}`", path.display()))?;
+    let mut command = Command::new(shards.script());
+    command.arg(number.to_string()).process_group(0);
+    command.stdin(Stdio::null()).stdout(log.try_clone()?);
+    let child = command.stderr(log).spawn();
+    child.with_context(|| format!("cannot start `{}`", shards.script().display()))
 }
 
 impl Drop for Local {

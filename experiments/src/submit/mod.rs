@@ -1,86 +1,44 @@
-//! `experiments submit`: a study in many processes of this machine.
+//! `experiments submit`: a study in many processes, of this machine or a cluster.
 //!
 //! The study is cut into shards, each a run of this program with `--shard`. What is done is
 //! seen from marks that the shards leave in their folder, so that one that is lost costs what
 //! it had in hand and nothing else.
 
+mod engine;
+mod hyperqueue;
 mod local;
+mod shards;
+mod slurm;
 
-use crate::args::SubmitArgs;
-use crate::program::program;
-use anyhow::{Context, ensure};
+use crate::args::{EngineName, SubmitArgs};
+use anyhow::Context;
 use cli_output::{OrInput, Outcome, Stage, is_interrupted, output, watch_interrupts};
+use engine::Engine;
+use hyperqueue::HyperQueue;
 use local::Local;
-use rope_sim::Precision;
 use run_log::files;
 use serde_json::{Value, json};
+use shards::Shards;
 use shared_types::ipc::message::Progress;
-use std::fs::{File, Permissions};
-use std::os::unix::fs::PermissionsExt;
+use slurm::Slurm;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How often marks are looked for.
 const LOOK: Duration = Duration::from_millis(500);
+/// How long after its end a shard's mark may come to be seen here: a network's file system is
+/// not at once the same everywhere.
+const SEEN_AFTER: Duration = Duration::from_secs(5);
 /// Arguments that are this command's to give.
 const OWN: [&str; 4] = ["--out", "--shard", "--threads", "--json"];
 
-/// The shards of a study in their folder.
-struct Shards {
-    folder: PathBuf,
-    count: u64,
-    /// Held: another submission of the same result would make them once more.
-    _lock: File,
-}
-
-impl Shards {
-    fn file(&self, number: u64) -> PathBuf {
-        self.folder.join(format!("shard-{number}.json"))
-    }
-
-    /// Left by a shard's script when the shard is made.
-    fn mark(&self, number: u64) -> PathBuf {
-        self.folder.join(format!("shard-{number}.done"))
-    }
-
-    /// Those that are not made yet.
-    fn missing(&self) -> Vec<u64> {
-        let is_made = |number| self.mark(number).exists() && self.file(number).exists();
-        (1..=self.count)
-            .filter(|number| !is_made(*number))
-            .collect()
-    }
-
-    /// Writes the script that makes the shard whose number is its argument.
-    fn write_script(&self, program: &Path, args: &SubmitArgs) -> anyhow::Result<PathBuf> {
-        let quoted = |word: &str| format!("'{}'", word.replace('\'', r"'\''"));
-        let here = std::env::current_dir().context("the current folder")?;
-        let study: Vec<String> = args.study.iter().map(|word| quoted(word)).collect();
-        let text = format!(
-            "#!/bin/sh\n\
-             # The shard of this number: shard.sh 3\n\
-             set -eu\n\
-             # Told to end, it ends after the program, which keeps what it has made.\n\
-             trap : TERM\n\
-             n=\"$1\"\n\
-             folder={folder}\n\
-             cd {here}\n\
-             {program} {study} --threads {threads} --shard \"$n/{count}\" --out \"$folder/shard-$n.json\"\n\
-             : > \"$folder/shard-$n.done\"\n",
-            folder = quoted(&self.folder.to_string_lossy()),
-            here = quoted(&here.to_string_lossy()),
-            program = quoted(&program.to_string_lossy()),
-            study = study.join(" "),
-            threads = args.threads,
-            count = self.count,
-        );
-        let path = self.folder.join("shard.sh");
-        files::write_atomic(&path, text.as_bytes())?;
-        std::fs::set_permissions(&path, Permissions::from_mode(0o755))
-            .with_context(|| format!("`{}`", path.display()))?;
-        Ok(path)
+fn engine(args: &SubmitArgs, shards: &Shards) -> Box<dyn Engine> {
+    match args.engine {
+        EngineName::Local => Box::new(Local::new(args)),
+        EngineName::Hyperqueue => Box::new(HyperQueue::new(shards.folder(), args)),
+        EngineName::Slurm => Box::new(Slurm::new(args)),
     }
 }
 
@@ -96,17 +54,20 @@ pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
     files::check_writable(&args.out).or_input()?;
     let own_file = std::env::current_exe().context("this program's own file");
     let own_file = own_file.or_failed()?;
-    let shards = open(args).or_input()?;
-    let script = shards.write_script(&own_file, args).or_failed()?;
+    let shards = Shards::open(args).or_input()?;
+    shards.write_script(&own_file, args).or_failed()?;
+    let script = shards.script();
     let stage = Stage::begin("submit");
     if args.prepare {
-        let (count, script) = (shards.count, script.display());
+        let (count, script) = (shards.count(), script.display());
         stage.done(&format!("{count} shards, to be made by `{script} N`"));
         return Ok(Some(json!({
             "ok": true, "command": "submit", "shards": count, "script": script.to_string(),
         })));
     }
-    let mut local = Local::new(&script, args).or_failed()?;
+    let mut engine = engine(args, &shards);
+    let is_here = args.engine == EngineName::Local;
+    let seen_after = if is_here { Duration::ZERO } else { SEEN_AFTER };
     for round in 0..=args.retries {
         let missing = shards.missing();
         if missing.is_empty() {
@@ -115,85 +76,52 @@ pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
         if round > 0 {
             eprintln!("{} shards failed; they are tried again", missing.len());
         }
-        local.submit(&missing);
-        watch(&mut local, &shards, &stage)?;
+        engine.submit(&shards, &missing).or_failed()?;
+        watch(engine.as_mut(), &shards, seen_after, &stage)?;
     }
     let missing = shards.missing();
     if let Some(first) = missing.first() {
         return Err(failed!(
             "{} of {} shards failed {} times; the first is {first}: see the logs in `{}`, or run `{} {first}`",
             missing.len(),
-            shards.count,
+            shards.count(),
             args.retries + 1,
-            shards.folder.display(),
+            shards.folder().display(),
             script.display()
         ));
     }
-    let paths: Vec<PathBuf> = (1..=shards.count).map(|n| shards.file(n)).collect();
+    let paths: Vec<PathBuf> = (1..=shards.count()).map(|n| shards.file(n)).collect();
     let trials = crate::results::join(&paths, &args.out).or_failed()?;
-    let seconds = stage.done(&format!("{trials} trials in {} shards", shards.count));
+    let seconds = stage.done(&format!("{trials} trials in {} shards", shards.count()));
     let result = print_result(&own_file, args)?;
     Ok(Some(json!({
-        "ok": true, "command": "submit", "shards": shards.count, "trials": trials,
-        "seconds": seconds, "out": args.out, "folder": shards.folder, "result": result,
+        "ok": true, "command": "submit", "shards": shards.count(), "trials": trials,
+        "seconds": seconds, "out": args.out, "folder": shards.folder(), "result": result,
     })))
 }
 
-/// The folder of the shards; one that holds those of something else is refused.
-fn open(args: &SubmitArgs) -> anyhow::Result<Shards> {
-    let name = args.out.file_name().context("--out names no file")?;
-    let mut name = name.to_owned();
-    name.push(".shards");
-    let folder = args.out.with_file_name(name);
-    let count = args.shards.unwrap_or(4 * u64::from(args.workers));
-    files::create_folder(&folder)?;
-    let folder = folder.canonicalize()?;
-    let lock = File::create(folder.join("lock")).context("the shards' lock")?;
-    ensure!(
-        lock.try_lock().is_ok(),
-        "another command makes the shards in `{}`: wait for it, or name another --out",
-        folder.display()
-    );
-    let kept = folder.join("study.json");
-    let kernels = [Precision::F32, Precision::F64].map(Precision::fastest_kernel);
-    let study = json!({
-        "study": args.study, "shards": count, "program": program()?,
-        "kernels": format!("{kernels:?}"),
-    });
-    if kept.exists() {
-        let found: Value = files::read_json(&kept)?;
-        ensure!(
-            found == study,
-            "`{}` holds shards of another study, program or processor, or another number of them: name another --out, or remove it",
-            folder.display()
-        );
-    } else {
-        files::write_json(&kept, &study)?;
-    }
-    Ok(Shards {
-        folder,
-        count,
-        _lock: lock,
-    })
-}
-
-/// Waits until all that was handed over has ended.
-fn watch(local: &mut Local, shards: &Shards, stage: &Stage) -> Outcome {
+/// Waits until all that was handed over has ended, and for marks that are seen later.
+fn watch(engine: &mut dyn Engine, shards: &Shards, seen_after: Duration, stage: &Stage) -> Outcome {
+    let mut over: Option<Instant> = None;
     loop {
-        let done = shards.count - shards.missing().len() as u64;
+        let missing = shards.missing().len() as u64;
+        let done = shards.count() - missing;
         if is_interrupted() {
             return Err(failed!(
                 "interrupted after {done} of {} shards; the same command goes on",
-                shards.count
+                shards.count()
             ));
         }
         stage.progress(&Progress {
             done: u32::try_from(done).unwrap_or(u32::MAX),
-            total: u32::try_from(shards.count).unwrap_or(u32::MAX),
+            total: u32::try_from(shards.count()).unwrap_or(u32::MAX),
             value: done as f64,
             label: "shards".to_owned(),
         });
-        if local.is_over().or_failed()? {
+        if over.is_none() && engine.is_over(shards).or_failed()? {
+            over = Some(Instant::now());
+        }
+        if over.is_some_and(|since| missing == 0 || since.elapsed() >= seen_after) {
             return Ok(());
         }
         sleep(LOOK);

@@ -1,0 +1,157 @@
+//! The shards of a submitted study: their folder, and the script that makes one.
+
+use crate::args::SubmitArgs;
+use crate::program::program;
+use anyhow::{Context, ensure};
+use rope_sim::Precision;
+use run_log::files;
+use serde_json::{Value, json};
+use std::fs::{File, Permissions};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// The shards of a study in their folder, while a command makes them. Dropped, what still waits
+/// in a queue makes none.
+#[derive(Debug)]
+pub struct Shards {
+    folder: PathBuf,
+    count: u64,
+    /// What this submission is called in its folder.
+    token: String,
+    /// Held: another submission of the same result would make them once more.
+    _lock: File,
+}
+
+impl Shards {
+    /// The folder of the shards; one that holds those of something else is refused.
+    pub fn open(args: &SubmitArgs) -> anyhow::Result<Self> {
+        let name = args.out.file_name().context("--out names no file")?;
+        let mut name = name.to_owned();
+        name.push(".shards");
+        let folder = args.out.with_file_name(name);
+        let count = args.shards.unwrap_or(4 * u64::from(args.workers));
+        files::create_folder(&folder)?;
+        let folder = folder.canonicalize()?;
+        let lock = File::create(folder.join("lock")).context("the shards' lock")?;
+        ensure!(
+            lock.try_lock().is_ok(),
+            "another command makes the shards in `{}`: wait for it, or name another --out",
+            folder.display()
+        );
+        let kept = folder.join("study.json");
+        let kernels = [Precision::F32, Precision::F64].map(Precision::fastest_kernel);
+        let study = json!({
+            "study": args.study, "shards": count, "program": program()?,
+            "kernels": format!("{kernels:?}"),
+        });
+        if kept.exists() {
+            let found: Value = files::read_json(&kept)?;
+            ensure!(
+                found == study,
+                "`{}` holds shards of another study, program or processor, or another number of them: name another --out, or remove it",
+                folder.display()
+            );
+        } else {
+            files::write_json(&kept, &study)?;
+        }
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH)?;
+        let shards = Self {
+            folder,
+            count,
+            token: format!("{}-{}", now.as_nanos(), std::process::id()),
+            _lock: lock,
+        };
+        files::write_atomic(&shards.submission(), shards.token.as_bytes())?;
+        Ok(shards)
+    }
+
+    /// Where they lie.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// How many they are.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The second argument of the script, by which a queue's shards end with this submission.
+    pub fn token(&self) -> &str {
+        &self.token
+    }
+
+    /// The script that makes the shard whose number is its argument.
+    pub fn script(&self) -> PathBuf {
+        self.folder.join("shard.sh")
+    }
+
+    /// Result file of a shard.
+    pub fn file(&self, number: u64) -> PathBuf {
+        self.folder.join(format!("shard-{number}.json"))
+    }
+
+    /// What a shard says.
+    pub fn log(&self, number: u64) -> PathBuf {
+        self.folder.join(format!("shard-{number}.log"))
+    }
+
+    /// Names the submission that runs.
+    fn submission(&self) -> PathBuf {
+        self.folder.join("submission")
+    }
+
+    /// Whether a shard's script has left its mark.
+    pub fn is_made(&self, number: u64) -> bool {
+        let mark = self.folder.join(format!("shard-{number}.done"));
+        mark.exists() && self.file(number).exists()
+    }
+
+    /// Those that are not made yet.
+    pub fn missing(&self) -> Vec<u64> {
+        let all = 1..=self.count;
+        all.filter(|number| !self.is_made(*number)).collect()
+    }
+
+    /// Writes the script.
+    pub fn write_script(&self, program: &Path, args: &SubmitArgs) -> anyhow::Result<()> {
+        let here = std::env::current_dir().context("the current folder")?;
+        let study: Vec<String> = args.study.iter().map(|word| quoted(word)).collect();
+        let text = format!(
+            "#!/bin/sh\n\
+             # The shard of this number: shard.sh 3\n\
+             set -eu\n\
+             # Told to end, it ends after the program, which keeps what it has made.\n\
+             trap : TERM\n\
+             n=\"$1\"\n\
+             folder={folder}\n\
+             # Of a submission that has ended, a queue may still hold shards.\n\
+             [ $# -lt 2 ] || [ \"$2\" = \"$(cat \"$folder/submission\" 2>&1)\" ] || exit 0\n\
+             cd {here}\n\
+             {program} {study} --threads {threads} --shard \"$n/{count}\" --out \"$folder/shard-$n.json\"\n\
+             : > \"$folder/shard-$n.done\"\n",
+            folder = quoted(&self.folder.to_string_lossy()),
+            here = quoted(&here.to_string_lossy()),
+            program = quoted(&program.to_string_lossy()),
+            study = study.join(" "),
+            threads = args.threads,
+            count = self.count,
+        );
+        let path = self.script();
+        files::write_atomic(&path, text.as_bytes())?;
+        std::fs::set_permissions(&path, Permissions::from_mode(0o755))
+            .with_context(|| format!("`{}`", path.display()))
+    }
+}
+
+impl Drop for Shards {
+    fn drop(&mut self) {
+        // Left behind, it costs a shard that is made twice.
+        let _ = std::fs::remove_file(self.submission());
+    }
+}
+
+/// A word for the shell.
+pub fn quoted(word: &str) -> String {
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
