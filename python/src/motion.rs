@@ -24,6 +24,31 @@ type Numbers3<'py> = PyArrayLike3<'py, f64, AllowTypeChange>;
 /// One number for each throw.
 type Array<'py, T> = Bound<'py, PyArray1<T>>;
 
+/// What `make` gives for 0 to `count`, in that order.
+fn on_all_processors<T: Send>(
+    count: usize,
+    make: &(impl Fn(usize) -> anyhow::Result<T> + Sync),
+) -> anyhow::Result<Vec<T>> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let each = count.div_ceil(threads).max(1);
+    let part = |first: usize| -> anyhow::Result<Vec<T>> {
+        (first..(first + each).min(count)).map(make).collect()
+    };
+    let parts = std::thread::scope(|scope| {
+        let begin = |first| scope.spawn(move || part(first));
+        let running: Vec<_> = (0..count).step_by(each).map(begin).collect();
+        let end = |part: std::thread::ScopedJoinHandle<'_, anyhow::Result<Vec<T>>>| {
+            part.join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        running
+            .into_iter()
+            .map(end)
+            .collect::<anyhow::Result<Vec<_>>>()
+    })?;
+    Ok(parts.into_iter().flatten().collect())
+}
+
 /// Motion of the rope's clamp in time: t = 0 is its begin, or a film's first frame.
 #[pyclass(frozen, module = "wag")]
 pub(crate) struct Motion {
@@ -244,7 +269,7 @@ impl Motion {
         limits: Option<PathBuf>,
         cell: Option<PathBuf>,
     ) -> PyResult<(Vec<Self>, Array<'py, f64>, Array<'py, bool>)> {
-        let (t, q) = (times_s.as_array(), q_rad.as_array());
+        let (t, q) = (times_s.as_array().to_owned(), q_rad.as_array().to_owned());
         let (count, waypoints) = t.dim();
         if q.dim() != (count, waypoints, JOINTS) {
             let (found, need) = (q.dim(), (count, waypoints, JOINTS));
@@ -260,10 +285,7 @@ impl Motion {
             let q: Vec<JointVector> = (0..waypoints).map(row).collect();
             slowed(&times_s, &q, &limits).with_context(|| format!("throw {i}"))
         };
-        let slowed = (0..count)
-            .map(slow)
-            .collect::<anyhow::Result<Vec<_>>>()
-            .or_input()?;
+        let slowed = py.detach(|| on_all_processors(count, &slow)).or_input()?;
         let factors = slowed.iter().map(|s| s.factor).collect::<Vec<f64>>();
         let within = slowed
             .iter()
