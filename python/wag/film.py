@@ -187,6 +187,7 @@ def identify(
         found, unconfirmed = _wag.identify_run(keypoints, how, accept_unconfirmed, cell)
         if found is None:
             _confirm(unconfirmed, False)
+        assert found is not None  # or it was not confirmed, which has been raised
         return Estimate._of(found, unconfirmed)
     if cell is not None:
         raise _wag.InputError("`cell` is for a run: give it to the motion instead")

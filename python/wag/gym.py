@@ -61,14 +61,15 @@ class _Trials:
         """Parameters and targets, each from -1 to 1, (trials, 12)."""
         ropes = 2.0 * (self.ropes - LOW) / (HIGH - LOW) - 1.0
         targets = 2.0 * (self.targets_m - TARGET_LOW) / (TARGET_HIGH - TARGET_LOW) - 1.0
-        return np.clip(np.concatenate([ropes, targets], axis=1), -1.0, 1.0)
+        context: Floats = np.concatenate([ropes, targets], axis=1)
+        return context.clip(-1.0, 1.0)
 
 
 def _actions(envs: VectorEnv, actions: Any) -> Floats:
     """One action for each environment, once these were reset."""
     if not hasattr(envs, "_trials"):
         raise gymnasium.error.ResetNeeded("call reset() before step()")
-    return numbers("actions", actions, envs.action_space.shape)
+    return numbers("actions", actions, envs.action_space.shape or ())
 
 
 def _describe(
@@ -151,6 +152,7 @@ class ThrowVectorEnv(VectorEnv):
             threads=self.threads,
         )
         near = found.point
+        assert near is not None  # it was asked for
         thrown = is_within & ~found.diverged
         distance_m = np.where(thrown, near.distance_m, self.NOT_THROWN_M)
         final, self._trials = self._trials, _Trials(self.np_random, self.num_envs)
@@ -232,7 +234,9 @@ class SwingVectorEnv(VectorEnv):
             velocity_m_s,
             self._trials.context(),
         ]
-        return np.nan_to_num(np.concatenate(seen, axis=1)).astype(np.float32)
+        observed: np.ndarray = np.concatenate(seen, axis=1)
+        finite: np.ndarray = np.nan_to_num(observed)
+        return finite.astype(np.float32)
 
     def _fastest(self, left_rad: Floats, qd_rad_s: Floats) -> Floats:
         """Speed towards a limit at the period's end from which a joint still brakes before it."""
@@ -326,8 +330,9 @@ class SwingEnv(_One):
         super().__init__(SwingVectorEnv, **options)
 
 
-for _name, _of, _vector in (
+_KNOWN: tuple[tuple[str, Any, Any], ...] = (
     ("wag/Throw-v0", ThrowEnv, ThrowVectorEnv),
     ("wag/Swing-v0", SwingEnv, SwingVectorEnv),
-):
+)
+for _name, _of, _vector in _KNOWN:
     gymnasium.register(_name, entry_point=_of, vector_entry_point=_vector)

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import os
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -91,11 +91,12 @@ def tabled(ropes: Rope | Sequence[Rope] | npt.ArrayLike) -> tuple[Floats, list[s
     """Ropes as a table of shape (ropes, 9), and the extras of those that have any."""
     if isinstance(ropes, Rope):
         ropes = [ropes]
-    if isinstance(ropes, Sequence) and all(isinstance(rope, Rope) for rope in ropes):
-        table = np.array([rope.array() for rope in ropes]).reshape(-1, len(PARAMETERS))
-        extras = [json.dumps(rope.extras) if rope.extras else None for rope in ropes]
+    listed = [rope for rope in ropes if isinstance(rope, Rope)] if isinstance(ropes, Sequence) else []
+    if isinstance(ropes, Sequence) and len(listed) == len(ropes):
+        table = np.array([rope.array() for rope in listed]).reshape(-1, len(PARAMETERS))
+        extras = [json.dumps(rope.extras) if rope.extras else None for rope in listed]
         return table, extras if any(extras) else []
-    table = numbers("ropes", ropes, (None, len(PARAMETERS)), (len(PARAMETERS),))
+    table = numbers("ropes", cast(npt.ArrayLike, ropes), (None, len(PARAMETERS)), (len(PARAMETERS),))
     return np.atleast_2d(table), []
 
 

@@ -85,6 +85,7 @@ def _json(path: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        return found
     except ValueError as error:
         raise _wag.InputError(f"`{os.fspath(path)}` is not JSON: {error}") from error
