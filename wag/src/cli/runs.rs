@@ -76,14 +76,17 @@ pub struct WatchArgs {
 
 #[derive(Debug, Subcommand)]
 pub enum ExportCommand {
-    /// Control cycles and measured joints as cycles.csv and joints.csv.
-    Csv {
-        /// Run folder, or its file run.mcap (cycles.bin of an older version).
-        run: PathBuf,
-        /// Folder for the tables, which must exist. Default: the run folder.
-        #[arg(long)]
-        out: Option<PathBuf>,
-    },
+    /// Control cycles and measured joints as cycles.csv and joints.csv in the folder DIR.
+    Csv(ExportArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// Run folder, or its file run.mcap (cycles.bin of an older version).
+    pub run: PathBuf,
+    /// Where to. Default: into the run folder.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -1,0 +1,28 @@
+//! A recorded run in the formats of other programs, for those who work on it with their own.
+//!
+//! Each format is a module with one function of the type [`Write`]. It reads the run through
+//! [`run_log::Run`], which it never changes, and writes whole files or whole folders: what
+//! fails leaves nothing behind. Wrong input is told apart from a failure to write, as
+//! [`cli_output::Failure`] has it.
+//!
+//! ```no_run
+//! # fn main() -> cli_output::Outcome {
+//! let written = run_export::csv(std::path::Path::new("runs/NAME"), None)?;
+//! println!("{}", written.report("csv"));
+//! # Ok(())
+//! # }
+//! ```
+#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
+
+mod csv;
+mod recorded;
+mod written;
+
+pub use csv::csv;
+pub use written::{Written, WrittenFile};
+
+use std::path::Path;
+
+/// Writes the run of a folder, or of its file `run.mcap`, to where it is told, or else into
+/// the run's folder.
+pub type Write = fn(run: &Path, out: Option<&Path>) -> cli_output::Outcome<Written>;
