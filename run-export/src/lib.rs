@@ -15,10 +15,15 @@
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 mod csv;
+mod destination;
+mod npz;
 mod recorded;
+mod ros2;
 mod written;
 
 pub use csv::csv;
+pub use npz::npz;
+pub use ros2::ros2;
 pub use written::{Written, WrittenFile};
 
 use std::path::Path;

@@ -78,6 +78,11 @@ pub struct WatchArgs {
 pub enum ExportCommand {
     /// Control cycles and measured joints as cycles.csv and joints.csv in the folder DIR.
     Csv(ExportArgs),
+    /// Cycles, joints, keypoints, plan and rope as arrays for numpy, in the file run.npz or OUT.
+    Npz(ExportArgs),
+    /// A bag of ROS 2 (MCAP), in the folder ros2 or OUT: it must not exist, or be an earlier one,
+    /// which is replaced.
+    Ros2(ExportArgs),
 }
 
 #[derive(Debug, Args)]

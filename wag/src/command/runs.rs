@@ -118,6 +118,8 @@ pub fn explain_stop(run: &Path) {
 pub fn export(command: &ExportCommand) -> Outcome<Option<Value>> {
     let (format, args, write): (_, _, run_export::Write) = match command {
         ExportCommand::Csv(args) => ("csv", args, run_export::csv),
+        ExportCommand::Npz(args) => ("npz", args, run_export::npz),
+        ExportCommand::Ros2(args) => ("ros2", args, run_export::ros2),
     };
     let written = write(&args.run, args.out.as_deref())?;
     for file in &written.files {
