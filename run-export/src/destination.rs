@@ -2,7 +2,6 @@
 //! export.
 
 use anyhow::{Context, Result, anyhow, ensure};
-use run_log::files;
 use shared_types::file_error::why;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -30,11 +29,8 @@ impl Destination {
             "`{name}` is there and is no earlier export, so it is not replaced: name a folder \
              that does not exist yet with --out"
         );
-        let parent = folder.parent().filter(|p| !p.as_os_str().is_empty());
-        let parent = parent.unwrap_or(Path::new("."));
-        files::create_folder(parent)?;
         Ok(Self {
-            building: temporary(parent, folder)?,
+            building: temporary(folder)?,
             folder: folder.to_owned(),
             is_export,
         })
@@ -49,8 +45,7 @@ impl Destination {
     /// earlier export comes back.
     pub(crate) fn put(self) -> Result<()> {
         let fail = || format!("cannot write `{}`", self.folder.display());
-        let parent = self.building().parent().unwrap_or(Path::new("."));
-        let aside = temporary(parent, &self.folder)?;
+        let aside = temporary(&self.folder)?;
         let earlier = aside.path().join("earlier");
         if (self.is_export)(&self.folder) {
             fs::rename(&self.folder, &earlier).with_context(fail)?;
@@ -64,12 +59,14 @@ impl Destination {
 }
 
 /// A folder of its own beside `folder`. The library's error tells a name that nobody knows.
-fn temporary(parent: &Path, folder: &Path) -> Result<TempDir> {
+fn temporary(folder: &Path) -> Result<TempDir> {
+    let parent = folder.parent().filter(|p| !p.as_os_str().is_empty());
     let mut builder = tempfile::Builder::new();
     let builder = builder
         .prefix(".export-")
         .permissions(PermissionsExt::from_mode(0o777));
-    builder.tempdir_in(parent).map_err(|error| {
+    let made = builder.tempdir_in(parent.unwrap_or(Path::new(".")));
+    made.map_err(|error| {
         let why = why(&error.kind().into());
         anyhow!("cannot write `{}`: {why}", folder.display())
     })
@@ -93,8 +90,8 @@ mod tests {
     #[test]
     fn an_export_takes_the_place_of_an_earlier_one_and_of_nothing_else() {
         let place = tempfile::tempdir().unwrap();
-        let to = place.path().join("above/export");
-        let held = || fs::read_dir(place.path().join("above")).unwrap().count();
+        let to = place.path().join("export");
+        let held = || fs::read_dir(place.path()).unwrap().count();
         for words in ["first", "second"] {
             export(&to, words).unwrap();
             assert_eq!(fs::read_to_string(to.join("mark")).unwrap(), words);
@@ -111,5 +108,7 @@ mod tests {
         assert!(refused.contains("no earlier export"), "{refused}");
         assert_eq!(fs::read_to_string(to.join("mark")).unwrap(), "second");
         assert_eq!(held(), 1);
+        let nowhere = export(&place.path().join("none/export"), "first").unwrap_err();
+        assert!(nowhere.to_string().contains("none/export"), "{nowhere}");
     }
 }
