@@ -14,6 +14,7 @@
 //! ```
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
+mod command;
 mod csv;
 mod destination;
 mod npz;
@@ -21,6 +22,7 @@ mod recorded;
 mod ros2;
 mod written;
 
+pub use command::{ExportArgs, ExportCommand};
 pub use csv::csv;
 pub use npz::npz;
 pub use ros2::ros2;

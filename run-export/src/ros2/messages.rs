@@ -157,3 +157,38 @@ pub(super) struct Log {
     pub(super) function: String,
     pub(super) line: u32,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers lie at multiples of their length, counted from behind the first four bytes; texts
+    /// end with a zero, which counts.
+    #[test]
+    fn a_message_has_the_bytes_of_the_specification() {
+        let message = JointState {
+            header: Header {
+                stamp: Time::of(1_000_000_002).unwrap(),
+                frame_id: String::new(),
+            },
+            name: vec!["j".to_owned()],
+            position: vec![1.0],
+            velocity: Vec::new(),
+            effort: Vec::new(),
+        };
+        let parts: [&[u8]; 9] = [
+            &[0, 1, 0, 0],
+            &[1, 0, 0, 0, 2, 0, 0, 0],
+            &[1, 0, 0, 0, 0, 0, 0, 0],
+            &[1, 0, 0, 0],
+            &[2, 0, 0, 0, b'j', 0, 0, 0],
+            &[1, 0, 0, 0],
+            &1.0_f64.to_le_bytes(),
+            &[0, 0, 0, 0],
+            &[0, 0, 0, 0],
+        ];
+        assert_eq!(cdr(&message).unwrap(), parts.concat());
+        let late = Time::of(1 << 62).unwrap_err().to_string();
+        assert!(late.contains("ROS has no time"), "{late}");
+    }
+}

@@ -74,26 +74,6 @@ pub struct WatchArgs {
     pub seconds: Option<f64>,
 }
 
-#[derive(Debug, Subcommand)]
-pub enum ExportCommand {
-    /// Control cycles and measured joints as cycles.csv and joints.csv in the folder DIR.
-    Csv(ExportArgs),
-    /// Cycles, joints, keypoints, plan and rope as arrays for numpy, in the file run.npz or OUT.
-    Npz(ExportArgs),
-    /// A bag of ROS 2 (MCAP), in the folder ros2 or OUT: it must not exist, or be an earlier one,
-    /// which is replaced.
-    Ros2(ExportArgs),
-}
-
-#[derive(Debug, Args)]
-pub struct ExportArgs {
-    /// Run folder, or its file run.mcap (cycles.bin of an older version).
-    pub run: PathBuf,
-    /// Where to. Default: into the run folder.
-    #[arg(long)]
-    pub out: Option<PathBuf>,
-}
-
 #[derive(Debug, Args)]
 #[command(after_help = "EXAMPLES:\n  \
     wag studio                      on a simulated rig of its own\n  \

@@ -1,6 +1,5 @@
-//! What reads a recorded run: `wag replay`, `wag explain`, `wag export`, `wag report`.
+//! What reads a recorded run: `wag replay`, `wag explain`, `wag report`.
 
-use crate::cli::ExportCommand;
 use crate::config;
 use anyhow::Context;
 use cli_output::{OrInput, Outcome, is_interrupted, output};
@@ -112,23 +111,6 @@ pub fn explain_stop(run: &Path) {
     if let Some(found) = cause.filter(|found| found.stopped && !known(found)) {
         output::remark(format_args!("{}", run_log::show(&found).trim_end()));
     }
-}
-
-/// A recorded run in other formats.
-pub fn export(command: &ExportCommand) -> Outcome<Option<Value>> {
-    let (format, args, write): (_, _, run_export::Write) = match command {
-        ExportCommand::Csv(args) => ("csv", args, run_export::csv),
-        ExportCommand::Npz(args) => ("npz", args, run_export::npz),
-        ExportCommand::Ros2(args) => ("ros2", args, run_export::ros2),
-    };
-    let written = write(&args.run, args.out.as_deref())?;
-    for file in &written.files {
-        println!("{} ({} {})", file.path.display(), file.count, file.of);
-    }
-    for missing in &written.missing {
-        output::remark(format_args!("not in this run: {missing}"));
-    }
-    Ok(Some(written.report(format)))
 }
 
 /// A run as one HTML file.
