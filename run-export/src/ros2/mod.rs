@@ -7,9 +7,9 @@ mod messages;
 
 use crate::destination::Destination;
 use crate::written::{Written, WrittenFile};
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result};
 use bag::{Bag, MARK, MESSAGES, METADATA, Topic};
-use cli_output::{OrInput, Outcome};
+use cli_output::{OrInput, Outcome, bad_input};
 use convert::Calibration;
 use definitions::{CAMERA_INFO, COMPRESSED_IMAGE, Definition, IMAGE_MARKER, JOINT_STATE, LOG, TF};
 use messages::TfMessage;
@@ -65,24 +65,22 @@ pub fn ros2(run: &Path, out: Option<&Path>) -> Outcome<Written> {
     let out = out.map_or_else(|| opened.folder().join(FOLDER), Path::to_owned);
     let destination = Destination::new(&out, is_bag).or_input()?;
     let folder = destination.building();
-    let mut bag = Bag::create(folder).or_failed()?;
+    let fail = || format!("cannot write `{}`", out.display());
+    let mut bag = Bag::create(folder).with_context(fail).or_failed()?;
     let mut calibration = None;
     let missing = opened
         .messages(|channel, at_ns, data| add(&mut bag, &mut calibration, channel, at_ns, data));
     let mut missing = missing.or_input()?;
     let absent = ALL.iter().filter(|topic| !bag.has(topic));
     let absent: Vec<_> = absent.map(|topic| topic.name.to_owned()).collect();
-    let run_name = run.display();
-    let check = || -> Result<()> {
-        ensure!(
-            absent.len() < ALL.len(),
-            "`{run_name}` holds no message for which ROS has a type"
-        );
-        Ok(())
-    };
-    check().or_input()?;
+    if absent.len() == ALL.len() {
+        let name = run.display();
+        return Err(bad_input!(
+            "`{name}` holds no message for which ROS has a type"
+        ));
+    }
     missing.extend(absent);
-    let count = bag.finish(folder).or_failed()?;
+    let count = bag.finish(folder).with_context(fail).or_failed()?;
     destination.put().or_failed()?;
     Ok(Written {
         run: run.to_owned(),
