@@ -1,6 +1,6 @@
 //! `wag export` as it is typed.
 
-use crate::{Write, csv, npz, ros2};
+use crate::{Write, csv, lerobot, npz, ros2};
 use clap::{Args, Subcommand};
 use cli_output::{Outcome, output, println};
 use serde_json::Value;
@@ -16,6 +16,9 @@ pub enum ExportCommand {
     /// A bag of ROS 2 (MCAP), in the folder ros2 or OUT: it must not exist, or be an earlier one,
     /// which is replaced.
     Ros2(ExportArgs),
+    /// Runs as one data set for LeRobot (format v3.0), an episode each; in builds with
+    /// `--features lerobot` only.
+    Lerobot(LerobotArgs),
 }
 
 /// What, and where to.
@@ -26,6 +29,20 @@ pub struct ExportArgs {
     /// Where to. Default: into the run folder.
     #[arg(long)]
     pub out: Option<PathBuf>,
+}
+
+/// Which runs, where to, and how fast.
+#[derive(Debug, Args)]
+pub struct LerobotArgs {
+    /// Run folders, which must agree in rate, size of pictures and number of keypoints.
+    #[arg(value_name = "RUN", required = true)]
+    pub runs: Vec<PathBuf>,
+    /// Folder for the data set: it must not exist, or be an earlier one, which is replaced.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Frames per second. Default: as many as pictures were recorded.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=250))]
+    pub fps: Option<u32>,
 }
 
 impl ExportCommand {
@@ -39,6 +56,7 @@ impl ExportCommand {
             Self::Csv(args) => ("csv", of_run(args, csv)),
             Self::Npz(args) => ("npz", of_run(args, npz)),
             Self::Ros2(args) => ("ros2", of_run(args, ros2)),
+            Self::Lerobot(args) => ("lerobot", lerobot(&args.runs, &args.out, args.fps)),
         };
         let written = written?;
         for file in &written.files {

@@ -17,13 +17,15 @@
 mod command;
 mod csv;
 mod destination;
+mod lerobot;
 mod npz;
 mod recorded;
 mod ros2;
 mod written;
 
-pub use command::{ExportArgs, ExportCommand};
+pub use command::{ExportArgs, ExportCommand, LerobotArgs};
 pub use csv::csv;
+pub use lerobot::lerobot;
 pub use npz::npz;
 pub use ros2::ros2;
 pub use written::{Written, WrittenFile};

@@ -4,10 +4,8 @@
 //! these and those can be joined. Lists have one length in all rows.
 
 use anyhow::{Context, Result};
-use parquet::basic::{ConvertedType, LogicalType, Repetition, Type as Physical};
-use parquet::data_type::{
-    ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int64Type,
-};
+use parquet::basic::{LogicalType, Repetition, Type as Physical};
+use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int64Type};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
@@ -60,13 +58,12 @@ impl Column {
 
     /// Its type, by which readers know lists, texts and pictures.
     fn schema(&self) -> Result<TypePtr> {
-        let of_list = |name| self.innermost(name);
         if self.lengths.is_empty() {
-            return of_list(&self.name);
+            return self.innermost(&self.name);
         }
-        let mut inner = of_list("element")?;
+        let mut inner = self.innermost("element")?;
         for depth in (0..self.lengths.len()).rev() {
-            let name = if depth == 0 { &self.name } else { "element" };
+            let name = if depth == 0 { &*self.name } else { "element" };
             let repeated = Type::group_type_builder("list")
                 .with_repetition(Repetition::REPEATED)
                 .with_fields(vec![inner])
@@ -74,7 +71,6 @@ impl Column {
             inner = Type::group_type_builder(name)
                 .with_repetition(Repetition::OPTIONAL)
                 .with_logical_type(Some(LogicalType::List))
-                .with_converted_type(ConvertedType::LIST)
                 .with_fields(vec![Arc::new(repeated)])
                 .build()?
                 .into();
@@ -135,13 +131,17 @@ fn put<T: DataType>(
     lengths: &[usize],
     optional: i16,
 ) -> Result<()> {
-    let mut column = group.next_column()?.context("the table has no such column")?;
+    let mut column = group
+        .next_column()?
+        .context("the table has no such column")?;
     // All of them are there: each list adds one that is repeated and one that may be null.
     let depth = i16::try_from(lengths.len())?;
     let defined = vec![optional + 2 * depth; values.len()];
     let repeated: Vec<i16> = (0..values.len()).map(|i| repetition(i, lengths)).collect();
     let repeated = (depth > 0).then_some(&repeated[..]);
-    column.typed::<T>().write_batch(values, Some(&defined), repeated)?;
+    column
+        .typed::<T>()
+        .write_batch(values, Some(&defined), repeated)?;
     Ok(column.close()?)
 }
 
@@ -161,10 +161,7 @@ fn repetition(index: usize, lengths: &[usize]) -> i16 {
 }
 
 /// A file of columns under way.
-#[allow(
-    missing_debug_implementations,
-    reason = "the library's writer tells nothing of use"
-)]
+#[derive(Debug)]
 pub(super) struct Table {
     path: PathBuf,
     writer: SerializedFileWriter<File>,
@@ -180,7 +177,9 @@ impl Table {
         let fail = || format!("cannot write `{}`", path.display());
         let file = File::create_new(path).with_context(fail)?;
         let fields = like.iter().map(Column::schema).collect::<Result<_>>()?;
-        let schema = Type::group_type_builder("schema").with_fields(fields).build()?;
+        let schema = Type::group_type_builder("schema")
+            .with_fields(fields)
+            .build()?;
         let texts = texts.iter().map(|(key, text)| KeyValue {
             key: (*key).to_owned(),
             value: Some(text.clone()),
@@ -211,11 +210,10 @@ impl Table {
     }
 
     /// Writes the file's end, without which nobody can read it.
-    pub(super) fn finish(self) -> Result<PathBuf> {
-        let Self { path, writer } = self;
-        let done = writer.close();
-        done.with_context(|| format!("cannot write `{}`", path.display()))?;
-        Ok(path)
+    pub(super) fn finish(self) -> Result<()> {
+        let fail = || format!("cannot write `{}`", self.path.display());
+        self.writer.close().with_context(fail)?;
+        Ok(())
     }
 }
 

@@ -7,6 +7,7 @@ use crate::recorded::RecordedRun;
 use anyhow::{Context, Result};
 use arm_model::JointVector;
 use cli_output::{OrInput, Outcome};
+use parquet::data_type::ByteArray;
 use run_log::{Run, files};
 use shared_types::{MonotonicNs, Task};
 use std::fmt;
@@ -62,6 +63,12 @@ impl fmt::Display for Kind {
 }
 
 impl Episode {
+    /// About how large it is (bytes): the pictures are nearly all of it.
+    pub(super) fn bytes(&self) -> usize {
+        let pictures = self.pictures.iter().flat_map(|pictures| &pictures.jpegs);
+        pictures.map(ByteArray::len).sum()
+    }
+
     /// Reads a run, so many frames a second, or else as many as it has pictures.
     ///
     /// # Errors
@@ -135,7 +142,10 @@ fn tracks<'a>(recorded: &RecordedRun, seen: Vec<(u64, &'a [u8])>) -> Tracks<'a> 
 
 /// Seven numbers a frame.
 fn joints(frames: impl Iterator<Item = Option<JointVector>>) -> Vec<f32> {
-    frames.flatten().flat_map(|q| q.0.map(|q| q as f32)).collect()
+    frames
+        .flatten()
+        .flat_map(|q| q.0.map(|q| q as f32))
+        .collect()
 }
 
 /// How many keypoints a frame has, and those of the camera's frames at these instants, as far as
@@ -145,20 +155,19 @@ fn keypoints(
     looked_ns: &[u64],
     within_ns: u64,
 ) -> Result<(usize, Vec<f32>)> {
-    let run = &recorded.run;
-    if !run.folder().join(files::KEYPOINTS).is_file() {
-        return Ok((0, Vec::new()));
-    }
-    let track = run.tracked_film()?.track;
+    let none = (0, Vec::new());
+    let Some(track) = recorded.run.keypoints()? else {
+        return Ok(none);
+    };
     let epoch = MonotonicNs(recorded.epoch_ns);
     let tracked = track.frames.iter().filter(|frame| !frame.lost);
     let tracked = Samples::new(tracked.map(|frame| (epoch.plus_s(frame.t_s).0, &frame.points)));
-    let found: Vec<_> = looked_ns
-        .iter()
+    let found = looked_ns.iter();
+    let found: Vec<_> = found
         .map(|at_ns| tracked.nearest(*at_ns, within_ns))
         .collect();
     if found.iter().all(Option::is_none) {
-        return Ok((0, Vec::new()));
+        return Ok(none);
     }
     let unknown = vec![[f64::NAN; 2]; track.keypoints];
     let points = found.iter().flat_map(|points| points.unwrap_or(&unknown));
@@ -171,7 +180,11 @@ fn in_words(run: &Run) -> Result<String> {
     let earlier = run.earlier()?;
     let Some(target_m) = earlier.target_m else {
         let is_wiggle = run.summary()?.unwrap_or_default()["command"] == "wiggle";
-        let words = if is_wiggle { "wiggle the rope" } else { "move the rope" };
+        let words = if is_wiggle {
+            "wiggle the rope"
+        } else {
+            "move the rope"
+        };
         return Ok(words.to_owned());
     };
     // Never minus nought.

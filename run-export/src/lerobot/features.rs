@@ -1,7 +1,7 @@
 //! The features of a set: what an episode's frames hold, under the names that LeRobot knows.
 
 use super::columns::{Column, Values};
-use super::episode::{Episode, Kind};
+use super::episode::Episode;
 use super::statistics::Distribution;
 use arm_model::JOINTS;
 use serde_json::{Value, json};
@@ -148,6 +148,7 @@ fn image(episode: &Episode) -> Option<Feature> {
     let [width, height] = pictures.size_px;
     let jpegs = pictures.jpegs.clone();
     let called = (0..jpegs.len()).map(|frame| format!("frame-{frame:06}.jpg"));
+    let called = called.collect();
     Some(Feature {
         described: json!({
             "dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"],
@@ -158,6 +159,6 @@ fn image(episode: &Episode) -> Option<Feature> {
             values: pictures.colours(),
             frames: jpegs.len(),
         },
-        column: Column::single(name, Values::Pictures(jpegs.clone(), called.collect())),
+        column: Column::single(name, Values::Pictures(jpegs, called)),
     })
 }

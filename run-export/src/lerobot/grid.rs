@@ -3,6 +3,7 @@
 use super::samples::Samples;
 use anyhow::{Context, Result, ensure};
 use arm_model::JointVector;
+use shared_types::MonotonicNs;
 
 /// Most frames a second that are made of pictures; no more are recorded.
 const FPS_MAX: u32 = 30;
@@ -41,7 +42,12 @@ impl Grid {
     /// No rate is named and there are no pictures, or fewer than are named; or the tracks have no
     /// time in common.
     pub(super) fn of(tracks: &Tracks<'_>, fps: Option<u32>) -> Result<Self> {
-        let Tracks { seen, measured, sent, last_ns } = tracks;
+        let Tracks {
+            seen,
+            measured,
+            sent,
+            last_ns,
+        } = tracks;
         let fps = rate(seen.period_ns(), fps)?;
         let joints = measured.ends().zip(sent.ends());
         let [begin_ns, end_ns] = joints.map_or([u64::MAX, 0], |(measured, sent)| {
@@ -81,7 +87,7 @@ impl Grid {
     /// The longest time without a sample, where it is worth telling (s).
     pub(super) fn gap_s<T: Copy>(self, samples: &Samples<T>) -> Option<f64> {
         let gap_ns = samples.longest_ns(self.begin_ns, self.at_ns(self.frames as u64));
-        (gap_ns > GAP_NS).then_some(gap_ns as f64 * 1e-9)
+        (gap_ns > GAP_NS).then(|| MonotonicNs(gap_ns).since_s(MonotonicNs(0)))
     }
 }
 
@@ -90,7 +96,9 @@ fn rate(period_ns: Option<u64>, named: Option<u32>) -> Result<u32> {
     let Some(period_ns) = period_ns else {
         return named.context("it has no pictures, whose rate would be taken: name one with --fps");
     };
-    let seen = (1e9 / period_ns.max(1) as f64).round().clamp(1.0, FPS_MAX.into()) as u32;
+    let seen = (1e9 / period_ns.max(1) as f64)
+        .round()
+        .clamp(1.0, FPS_MAX.into()) as u32;
     let fps = named.unwrap_or(seen);
     ensure!(
         fps <= seen,
@@ -154,7 +162,10 @@ mod tests {
     fn a_long_gap_is_told() {
         let grid = Grid::of(&tracks(every(1_000, 4_000, 50, &[][..])), None).unwrap();
         let times = [1_000, 2_000, 2_400, 9_000].map(|ms| (ms * MS, ()));
-        assert_eq!(grid.gap_s(&Samples::new(times[..3].iter().copied())), Some(1.0));
+        assert_eq!(
+            grid.gap_s(&Samples::new(times[..3].iter().copied())),
+            Some(1.0)
+        );
         assert_eq!(grid.gap_s(&every(0, 9_000, 250, ())), None);
     }
 }

@@ -9,11 +9,11 @@ use serde_json::{Map, Value, json};
 
 /// Version of the format.
 const VERSION: &str = "v3.0";
+/// Where each episode lies: one file is enough for a million of them.
+pub(super) const EPISODES: &str = "meta/episodes/chunk-000/file-000.parquet";
 /// Files of a folder (`chunk-NNN`), and megabytes from which the library begins another file.
-pub(super) const CHUNK_FILES: usize = 1000;
+const CHUNK_FILES: usize = 1000;
 pub(super) const FILE_MB: usize = 100;
-/// The library's own pattern of data files.
-const DATA_PATH: &str = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet";
 
 /// Statistics of a feature.
 #[derive(Debug, Clone)]
@@ -83,23 +83,33 @@ pub(super) struct Told {
     pub(super) statistics: Vec<Statistics>,
 }
 
-/// Folder and number of a file by its number in the set.
-pub(super) const fn place_of(file: usize) -> [usize; 2] {
+/// Folder and number of a data file by its number in the set.
+const fn place_of(file: usize) -> [usize; 2] {
     [file / CHUNK_FILES, file % CHUNK_FILES]
 }
 
-/// `info.json`: what the features are, and how many of everything there are.
-pub(super) fn info(kind: Kind, features: &[Feature], totals: [usize; 3]) -> Value {
+/// The path of a data file, by its number.
+pub(super) fn data_path(file: usize) -> String {
+    let [chunk, file] = place_of(file);
+    format!("data/chunk-{chunk:03}/file-{file:03}.parquet")
+}
+
+/// The features, as `info.json` has them.
+pub(super) fn described(features: &[Feature]) -> Value {
+    let each = features.iter();
+    each.map(|feature| (feature.column.name.clone(), feature.described.clone()))
+        .collect::<Map<_, _>>()
+        .into()
+}
+
+/// `info.json`: the features, and how many episodes, frames and tasks there are.
+pub(super) fn info(kind: Kind, features: &Value, totals: [usize; 3]) -> Value {
     let [episodes, frames, tasks] = totals;
-    let features = features.iter().map(|feature| {
-        let name = feature.column.name.clone();
-        (name, feature.described.clone())
-    });
     json!({
         "codebase_version": VERSION,
         "robot_type": "xarm7",
         "fps": kind.fps,
-        "features": features.collect::<Map<_, _>>(),
+        "features": features,
         "total_episodes": episodes,
         "total_frames": frames,
         "total_tasks": tasks,
@@ -107,7 +117,7 @@ pub(super) fn info(kind: Kind, features: &[Feature], totals: [usize; 3]) -> Valu
         "chunks_size": CHUNK_FILES,
         "data_files_size_in_mb": FILE_MB,
         "video_files_size_in_mb": 200,
-        "data_path": DATA_PATH,
+        "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
         "video_path": null,
     })
 }
@@ -115,7 +125,9 @@ pub(super) fn info(kind: Kind, features: &[Feature], totals: [usize; 3]) -> Valu
 /// `stats.json`.
 pub(super) fn stats(statistics: &[Statistics]) -> Value {
     let each = statistics.iter();
-    each.map(|feature| (feature.name.clone(), feature.json())).collect::<Map<_, _>>().into()
+    each.map(|feature| (feature.name.clone(), feature.json()))
+        .collect::<Map<_, _>>()
+        .into()
 }
 
 /// `tasks.parquet` with the text by which pandas knows that tasks are looked up by their words.
@@ -142,18 +154,22 @@ pub(super) fn tasks(tasks: &[String]) -> ([Column; 2], String) {
 
 /// The text by which the library `datasets` knows pictures and arrays in the columns.
 pub(super) fn hugging_face(features: &[Feature]) -> String {
-    let described = features.iter().map(|Feature { column, described, .. }| {
-        let value = json!({ "dtype": described["dtype"], "_type": "Value" });
-        let told = match (&column.values, &column.lengths[..]) {
-            (Values::Pictures(..), _) => json!({ "_type": "Image" }),
-            (_, []) => value,
-            (_, [length]) => json!({ "feature": value, "length": length, "_type": "List" }),
-            (_, shape) => {
-                json!({ "shape": shape, "dtype": described["dtype"], "_type": "Array2D" })
-            }
-        };
-        (column.name.clone(), told)
-    });
+    let described = features.iter().map(
+        |Feature {
+             column, described, ..
+         }| {
+            let value = json!({ "dtype": described["dtype"], "_type": "Value" });
+            let told = match (&column.values, &column.lengths[..]) {
+                (Values::Pictures(..), _) => json!({ "_type": "Image" }),
+                (_, []) => value,
+                (_, [length]) => json!({ "feature": value, "length": length, "_type": "List" }),
+                (_, shape) => {
+                    json!({ "shape": shape, "dtype": described["dtype"], "_type": "Array2D" })
+                }
+            };
+            (column.name.clone(), told)
+        },
+    );
     json!({ "info": { "features": described.collect::<Map<_, _>>() } }).to_string()
 }
 
@@ -164,12 +180,19 @@ pub(super) fn episodes(told: &[Told], tasks: &[String]) -> Vec<Column> {
     let task = |told: &Told| tasks[told.task].clone();
     let mut columns = vec![
         Column::single("episode_index", integers(0..told.len())),
-        Column::lists("tasks", &[1], Values::Texts(told.iter().map(task).collect())),
+        Column::lists(
+            "tasks",
+            &[1],
+            Values::Texts(told.iter().map(task).collect()),
+        ),
         Column::single("length", each(&|told| told.frames)),
         Column::single("data/chunk_index", each(&|told| place_of(told.file)[0])),
         Column::single("data/file_index", each(&|told| place_of(told.file)[1])),
         Column::single("dataset_from_index", each(&|told| told.first_frame)),
-        Column::single("dataset_to_index", each(&|told| told.first_frame + told.frames)),
+        Column::single(
+            "dataset_to_index",
+            each(&|told| told.first_frame + told.frames),
+        ),
     ];
     let first = told.first().map(|told| &told.statistics);
     for (feature, Statistics { name, shape, .. }) in first.into_iter().flatten().enumerate() {

@@ -7,7 +7,7 @@
 #[cfg(feature = "lerobot")]
 mod columns;
 #[cfg(feature = "lerobot")]
-mod destination;
+mod data;
 #[cfg(feature = "lerobot")]
 mod episode;
 #[cfg(feature = "lerobot")]
@@ -39,10 +39,11 @@ use std::path::{Path, PathBuf};
 /// written.
 #[cfg(feature = "lerobot")]
 pub fn lerobot(runs: &[PathBuf], out: &Path, fps: Option<u32>) -> Outcome<Written> {
+    use crate::destination::Destination;
     use cli_output::OrInput;
 
-    let destination = destination::Destination::new(out).or_input()?;
-    let mut set = set::Set::new(destination.building());
+    let destination = Destination::new(out, set::is_set).or_input()?;
+    let mut set = set::Set::new(destination.building().to_owned());
     for run in runs {
         let episode = episode::Episode::read(run, fps)?;
         set.check(&episode).or_input()?;
@@ -63,4 +64,16 @@ pub fn lerobot(_runs: &[PathBuf], _out: &Path, _fps: Option<u32>) -> Outcome<Wri
         "this build cannot write data sets for LeRobot; build it with `cargo build --release -p \
          wag --features lerobot` (the Debian package has it)"
     ))
+}
+
+#[cfg(all(test, not(feature = "lerobot")))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_build_without_it_says_how_one_with_it_is_made() {
+        let failure = lerobot(&[], Path::new("set"), None).unwrap_err();
+        assert_eq!(failure.exit_code(), 2);
+        assert!(failure.to_string().contains("--features lerobot"));
+    }
 }

@@ -46,7 +46,10 @@ impl Distribution {
             })
             .collect();
         let sum = |term: &dyn Fn(f64) -> f64| -> f64 {
-            rising.iter().map(|(v, times)| *times as f64 * term(*v)).sum()
+            rising
+                .iter()
+                .map(|(v, times)| *times as f64 * term(*v))
+                .sum()
         };
         let mean = sum(&|value| value) / count as f64;
         let variance = sum(&|value| (value - mean).powi(2)) / count as f64;
@@ -75,12 +78,18 @@ mod tests {
         for ((name, found), expected) in NAMES.iter().zip(found.unwrap()).zip(expected) {
             assert!((found - expected).abs() < 1e-9, "{name}: {found}");
         }
-        assert!(Distribution::of([f64::NAN].into_iter()).statistics().is_none());
+        assert!(
+            Distribution::of([f64::NAN].into_iter())
+                .statistics()
+                .is_none()
+        );
     }
 
     #[test]
     fn quantiles_between_two_values_are_in_proportion() {
-        let found = Distribution::of([4.0, 2.0].into_iter()).statistics().unwrap();
+        let found = Distribution::of([4.0, 2.0].into_iter())
+            .statistics()
+            .unwrap();
         for (place, expected) in [(4, 2.02), (5, 2.2), (6, 3.0), (7, 3.8), (8, 3.98)] {
             assert!((found[place] - expected).abs() < 1e-12, "{found:?}");
         }
