@@ -13,6 +13,9 @@ use shared_types::{MonotonicNs, Task};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+/// Stamps of the camera closer than this are of one and the same frame.
+const SAME_NS: u64 = 1_000_000;
+
 /// A run, frame by frame.
 #[derive(Debug)]
 pub(super) struct Episode {
@@ -95,11 +98,12 @@ impl Episode {
         let shown: Vec<(u64, &[u8])> = grid.instants().filter_map(shown).collect();
         let pictures = (!shown.is_empty()).then(|| Pictures::of(&shown));
         let pictures = pictures.transpose()?;
-        let looked_ns: Vec<u64> = match &pictures {
-            Some(_) => shown.iter().map(|(at_ns, _)| *at_ns).collect(),
-            None => grid.instants().collect(),
+        // Keypoints are those of the picture's own frame of the camera, not of one near it.
+        let (looked_ns, within_ns): (Vec<u64>, _) = match &pictures {
+            Some(_) => (shown.iter().map(|(at_ns, _)| *at_ns).collect(), SAME_NS),
+            None => (grid.instants().collect(), grid.half_ns()),
         };
-        let (count, keypoints) = keypoints(recorded, &looked_ns, grid.half_ns())?;
+        let (count, keypoints) = keypoints(recorded, &looked_ns, within_ns)?;
 
         let gaps = [
             ("pictures", grid.gap_s(&tracks.seen)),
