@@ -1,20 +1,9 @@
-//! What the control loop did and was told: tables of it, and what they show of the arm.
+//! What the control loop did and was told, and what that shows of the arm.
 
-use crate::files;
-use anyhow::Result;
 use arm_model::JointVector;
-use shared_types::ipc::{ControllerMode, CycleRecord, JointReport};
-use shared_types::{FaultCode, MonotonicNs};
-use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use shared_types::MonotonicNs;
+use shared_types::ipc::{CycleRecord, JointReport};
 
-/// Table of the control cycles of a run, as `wag export csv` writes it.
-pub const CYCLES_TABLE: &str = "cycles.csv";
-/// Table of its measured joints.
-const JOINTS_TABLE: &str = "joints.csv";
-/// Columns of [`CYCLES_TABLE`].
-const CYCLES_HEADER: &str = "cycle,deadline_s,mode,fault,sent,wake_late_us,compute_us,send_us,\
-    reply_us,missed,dropped,trajectory_s,q1_c,q2_c,q3_c,q4_c,q5_c,q6_c,q7_c\n";
 /// Reports closer than this are one and the same (the fastest come every 4 ms).
 const SAME_REPORT_NS: u64 = 1_000_000;
 /// Largest lag looked for (ms).
@@ -45,45 +34,6 @@ impl Cycles {
         reports
             .filter(|(at_ns, _)| (from_ns..=to_ns).contains(at_ns))
             .collect()
-    }
-
-    /// Writes `cycles.csv` and, where the arm reported its joints, `joints.csv` into
-    /// `folder`; times (s) count from `epoch_ns` (CLOCK_MONOTONIC). Returns the files with
-    /// their rows.
-    pub fn write_tables(&self, folder: &Path, epoch_ns: u64) -> Result<Vec<(PathBuf, usize)>> {
-        let since = |ns: u64| MonotonicNs(ns).since_s(MonotonicNs(epoch_ns));
-        let measured = self.joints_between(0, u64::MAX);
-        let mut written = vec![(folder.join(CYCLES_TABLE), self.cycles.len())];
-        if measured.len() >= 2 {
-            let rows = measured.iter().map(|(t, q)| (since(*t), *q));
-            written.push((folder.join(JOINTS_TABLE), measured.len()));
-            files::write_joints(&written[1].0, rows)?;
-        }
-        let mut text = CYCLES_HEADER.to_owned();
-        for c in &self.cycles {
-            write!(
-                text,
-                "{},{:.6},{:?},{:?},{},{:.1},{:.1},{:.1},{:.1},{},{},{:.6}",
-                c.cycle,
-                since(c.deadline_ns),
-                ControllerMode::from_raw(c.mode),
-                FaultCode::from_raw(c.fault).unwrap_or_default(),
-                c.sent,
-                f64::from(c.wake_late_ns) / 1e3,
-                f64::from(c.compute_ns) / 1e3,
-                f64::from(c.send_ns) / 1e3,
-                f64::from(c.reply_ns) / 1e3,
-                c.missed,
-                c.dropped,
-                c.trajectory_s,
-            )?;
-            for q in c.q_c.iter() {
-                write!(text, ",{q:.9}")?;
-            }
-            text.push('\n');
-        }
-        files::write_atomic(&written[0].0, text.as_bytes())?;
-        Ok(written)
     }
 
     /// How late `joint` (0-based) follows its setpoints in a motion between two instants
@@ -146,46 +96,6 @@ fn interpolated(setpoints: &[(u64, f64)], at_ns: u64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn tables_hold_one_row_per_cycle_and_report() {
-        let report = |stamp_ns: u64, q1: f64| JointReport {
-            stamp_ns,
-            q: JointVector([q1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-            ..JointReport::default()
-        };
-        let cycle = CycleRecord {
-            cycle: 7,
-            deadline_ns: 2_004_000_000,
-            mode: ControllerMode::Streaming as u8,
-            sent: 1,
-            wake_late_ns: 12_500,
-            trajectory_s: -1.0,
-            q_c: JointVector([0.5; 7]),
-            ..CycleRecord::default()
-        };
-        let reported = Cycles {
-            cycles: vec![cycle],
-            joints: vec![
-                report(2_003_000_000, 0.2),
-                report(1_999_000_000, 0.1),
-                report(2_003_400_000, 0.2),
-            ],
-        };
-        let folder = tempfile::tempdir().unwrap();
-        let written = reported.write_tables(folder.path(), 2_000_000_000).unwrap();
-        assert_eq!([written[0].1, written[1].1], [1, 2]);
-        let joints = files::read_joints(&folder.path().join(JOINTS_TABLE)).unwrap();
-        assert_eq!(joints.times_s, [-0.001, 0.003]);
-        assert_eq!([joints.q[0][0], joints.q[1][0]], [0.1, 0.2]);
-        let text = std::fs::read_to_string(folder.path().join(CYCLES_TABLE)).unwrap();
-        let q = ",0.500000000".repeat(7);
-        assert_eq!(
-            text.lines().nth(1).unwrap(),
-            format!("7,0.004000,Streaming,None,1,12.5,0.0,0.0,0.0,0,0,-1.000000{q}")
-        );
-        assert_eq!(text.lines().count(), 2);
-    }
 
     #[test]
     fn a_planted_lag_is_found() {

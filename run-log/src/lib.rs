@@ -44,7 +44,7 @@ mod unconfirmed;
 pub use clamp_motion::ClampMotion;
 pub use command_line::{CommandLine, quoted};
 pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
-pub use cycles::{CYCLES_TABLE, Cycles};
+pub use cycles::Cycles;
 pub use earlier::Earlier;
 pub use explanation::{Explanation, Late, LimitExceeded, Row, Stop, explain};
 pub use margins::Margin;

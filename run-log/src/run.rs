@@ -1,13 +1,13 @@
 //! A recorded run, from its folder or its file.
 
 use crate::files::cannot_read;
-use crate::mcap_file::{RunFilm, is_mcap, replay_bytes};
-use crate::{CommandLine, Cycles, Explanation, RunLog, explain, files};
+use crate::mcap_file::{RunFilm, is_mcap, messages, replay_bytes};
+use crate::{Channel, CommandLine, Cycles, Explanation, RunLog, explain, files};
 use anyhow::{Context, Result, bail, ensure};
 use arm_model::Cell;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde_json::Value;
-use shared_types::{Plan, RopeParams};
+use shared_types::{KeypointTrack, Plan, RopeParams};
 use std::path::{Path, PathBuf};
 
 /// A run. What a folder does not hold is `None`; what it holds and is damaged is an error
@@ -117,6 +117,34 @@ impl Run {
         RunFilm::read(&self.film)
     }
 
+    /// Hands every message of the run's file to `each` in the order of the file, with its time
+    /// (wall clock, ns), as they were given to [`crate::McapFile`]; what is missing of the file,
+    /// in words.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no MCAP file, or `each` fails.
+    pub fn messages(
+        &self,
+        each: impl FnMut(Channel, u64, &[u8]) -> Result<()>,
+    ) -> Result<Vec<String>> {
+        let fail = || format!("run file `{}`", self.film.display());
+        let bytes = std::fs::read(&self.film).map_err(cannot_read(&self.film));
+        let walked = messages(&bytes.with_context(fail)?, each).with_context(fail)?;
+        let damaged = format!("{} damaged chunks of its file", walked.damaged_chunks);
+        let flaws = [
+            (walked.damaged_chunks > 0, damaged),
+            (
+                !walked.whole,
+                "the end of its file, which breaks off".to_owned(),
+            ),
+        ];
+        Ok(flaws
+            .into_iter()
+            .filter(|(holds, _)| *holds)
+            .map(|(_, words)| words)
+            .collect())
+    }
+
     /// A file of the folder, read by `read` where it is there.
     fn file<T>(&self, name: &str, read: impl FnOnce(&Path) -> Result<T>) -> Result<Option<T>> {
         let path = self.folder.join(name);
@@ -174,6 +202,16 @@ impl Run {
     /// The cell it ran in; runs of older versions do not tell it.
     pub fn cell(&self) -> Result<Option<Cell>> {
         self.file(files::CELL, files::read_cell)
+    }
+
+    /// The rope's keypoints in the film of its wiggle.
+    pub fn keypoints(&self) -> Result<Option<KeypointTrack>> {
+        self.file(files::KEYPOINTS, |path| {
+            let track: KeypointTrack = files::read_json(path)?;
+            let fail = || format!("keypoints `{}`", path.display());
+            track.validate().with_context(fail)?;
+            Ok(track)
+        })
     }
 
     /// The identified rope.

@@ -27,14 +27,9 @@ impl Run {
     pub fn tracked_film(&self) -> Result<TrackedFilm> {
         let path = self.folder().join(files::KEYPOINTS);
         let name = path.display();
-        let track = files::read_text(&path).with_context(|| {
-            format!("`{name}`: a rope is identified again from a run whose film was tracked; `wag track --video RUN --camera RUN/camera.toml --out {name}` tracks it")
+        let track = self.keypoints()?.with_context(|| {
+            format!("`{name}` is not there: a rope is identified again from a run whose film was tracked; `wag track --video RUN --camera RUN/camera.toml --out {name}` tracks it")
         })?;
-        let track: KeypointTrack =
-            serde_json::from_str(&track).with_context(|| format!("keypoints `{name}`"))?;
-        track
-            .validate()
-            .with_context(|| format!("keypoints `{name}`"))?;
         let summary = self.summary()?.unwrap_or_default();
         let epoch_ns = summary["epoch_ns"].as_u64().filter(|ns| *ns > 0);
         let epoch = MonotonicNs(epoch_ns.with_context(|| {

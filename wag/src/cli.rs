@@ -118,9 +118,9 @@ pub enum Command {
         /// Run folder, or its file run.mcap (cycles.bin of an older version).
         run: PathBuf,
     },
-    /// Write the recorded cycles and joints of a run as tables.
+    /// Write a recorded run in another format: tables, arrays for numpy, a bag of ROS 2.
     #[command(subcommand)]
-    Export(ExportCommand),
+    Export(run_export::ExportCommand),
     /// Write a run as one HTML file: replay in space, joints, limits, rope, times.
     Report {
         /// Run folder.

@@ -77,6 +77,13 @@ impl Channel {
     pub const fn topic(self) -> &'static str {
         Self::ALL[self as usize].1
     }
+
+    /// The channel of a topic.
+    pub(super) fn of_topic(topic: &str) -> Option<Self> {
+        let mut all = Self::ALL.into_iter();
+        all.find(|(_, name, _)| *name == topic)
+            .map(|(channel, ..)| channel)
+    }
 }
 
 #[cfg(test)]

@@ -22,6 +22,8 @@ use std::path::{Path, PathBuf};
 
 /// Table of texts that holds the camera, and its only entry.
 pub(super) const CAMERA: [&str; 2] = ["camera", "json"];
+/// Table of texts and the entry that tells how far its clock was ahead of CLOCK_MONOTONIC (ns).
+pub(super) const AHEAD: [&str; 2] = ["wag", "wall_minus_monotonic_ns"];
 /// Joints are taken from so much before the first picture to so much after the last (ns).
 const MARGIN_NS: u64 = 500_000_000;
 /// A longer time without a record means that some are missing (ns).
@@ -46,6 +48,8 @@ pub struct RunFilm {
     picture_bytes: usize,
     /// The camera, or why what the file tells is none.
     camera: Option<Result<StereoCamera, String>>,
+    /// How far the file's clock was ahead of CLOCK_MONOTONIC (ns), where it tells.
+    ahead_ns: Option<u64>,
     joints: Vec<(u64, JointVector)>,
     /// The motions that were streamed.
     streamed: Vec<Streamed>,
@@ -148,6 +152,10 @@ impl RunFilm {
                 Record::Metadata(table) if table.name == CAMERA[0] => {
                     self.camera = Some(camera_of(table.metadata.get(CAMERA[1])));
                 }
+                Record::Metadata(table) if table.name == AHEAD[0] => {
+                    let ahead_ns = table.metadata.get(AHEAD[1]);
+                    self.ahead_ns = ahead_ns.and_then(|ns| ns.parse().ok());
+                }
                 Record::Message { header, data } => {
                     let Some(topic) = topics.get(&header.channel_id) else {
                         return Ok(());
@@ -213,6 +221,23 @@ impl RunFilm {
             _ => {}
         }
         self.last_cycle = Some((at_ns, streams));
+    }
+
+    /// Every picture of the left eye in order of time: when its exposure began (CLOCK_MONOTONIC,
+    /// ns), and the JPEG.
+    ///
+    /// # Errors
+    /// There are pictures, and the file does not tell how its clock goes with that one.
+    pub fn pictures(&self) -> Result<Vec<(u64, &[u8])>> {
+        let ahead_ns = self.ahead_ns.or(self.pictures.is_empty().then_some(0));
+        let ahead_ns = ahead_ns.with_context(|| {
+            let [table, entry] = AHEAD;
+            let path = self.path.display();
+            format!("run file `{path}` lacks the entry `{entry}` of its table of texts `{table}`")
+        })?;
+        let on_clock = |picture: &Picture| picture.stamp_ns.saturating_sub(ahead_ns);
+        let pictures = self.pictures.iter();
+        Ok(pictures.map(|p| (on_clock(p), &p.jpeg[..])).collect())
     }
 
     /// What is missing of a motion's pictures, first to last, and of the whole file.

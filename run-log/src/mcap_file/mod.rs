@@ -26,7 +26,7 @@ pub use counts::RecordingCounts;
 pub(crate) use film::GAP_NS;
 pub use film::{RunFilm, RunPart};
 pub use image::left_jpeg;
-pub(crate) use read::{is_mcap, replay_bytes};
+pub(crate) use read::{is_mcap, messages, replay_bytes};
 pub use recorder::{Recorded, RecorderConfig, run as record};
 pub use recover::{Recovered, recover};
 pub use results::{RopeMotion, SimulateRope};

@@ -1,11 +1,12 @@
 //! Reading a file, whole or not.
 
 use super::channel::Channel;
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use mcap::MAGIC;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use rt_controller::recording::chunk::{self, Front};
+use std::collections::BTreeMap;
 
 /// Opcode and length.
 const FRONT_LEN: usize = 9;
@@ -96,6 +97,36 @@ pub(super) fn walk(
     Ok(walked)
 }
 
+/// Hands every message of the channels of this program to `each` in the order of the file,
+/// with its time (wall clock, ns).
+///
+/// # Errors
+/// The bytes are no MCAP file, or `each` fails.
+pub(crate) fn messages(
+    bytes: &[u8],
+    mut each: impl FnMut(Channel, u64, &[u8]) -> Result<()>,
+) -> Result<Walked> {
+    let mut channels = BTreeMap::new();
+    walk(bytes, |record| {
+        match record {
+            Record::Channel(found) => {
+                let known = Channel::of_topic(&found.topic);
+                channels.extend(known.map(|channel| (found.id, channel)));
+            }
+            Record::Message { header, data } => {
+                if let Some(channel) = channels.get(&header.channel_id) {
+                    let at_ns = header.log_time;
+                    each(*channel, at_ns, data).with_context(|| {
+                        format!("channel `{}`, time {at_ns} ns", channel.topic())
+                    })?;
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    })
+}
+
 /// Bytes in which a chunk tells how long its records are together.
 const UNCOMPRESSED_LEN: std::ops::Range<usize> = FRONT_LEN + 16..FRONT_LEN + 24;
 
@@ -179,7 +210,6 @@ mod tests {
     use super::*;
     use crate::mcap_file::writer::options;
     use mcap::records::MessageHeader;
-    use std::collections::BTreeMap;
     use std::io::Cursor;
 
     #[test]

@@ -4,7 +4,7 @@
 use super::channel::Channel;
 use super::clock::{Clock, Thinned};
 use super::counts::{Gaps, RecordingCounts};
-use super::film::CAMERA;
+use super::film::{AHEAD, CAMERA};
 use super::image::left_jpeg;
 use super::messages::{self, Level};
 use super::results::{Results, SimulateRope};
@@ -153,11 +153,11 @@ impl Recording {
         let mut file = McapFile::create(&config.file)?;
         let at_ns = clock.now_ns();
         file.metadata(
-            "wag",
+            AHEAD[0],
             &[
                 ("version", shared_types::VERSION.to_owned()),
                 ("domain", config.domain.clone()),
-                ("wall_minus_monotonic_ns", clock.ahead_ns.to_string()),
+                (AHEAD[1], clock.ahead_ns.to_string()),
                 ("pictures_hz", config.pictures_hz.to_string()),
             ],
         )?;

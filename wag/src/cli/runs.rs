@@ -74,18 +74,6 @@ pub struct WatchArgs {
     pub seconds: Option<f64>,
 }
 
-#[derive(Debug, Subcommand)]
-pub enum ExportCommand {
-    /// Control cycles and measured joints as cycles.csv and joints.csv.
-    Csv {
-        /// Run folder, or its file run.mcap (cycles.bin of an older version).
-        run: PathBuf,
-        /// Folder for the tables, which must exist. Default: the run folder.
-        #[arg(long)]
-        out: Option<PathBuf>,
-    },
-}
-
 #[derive(Debug, Args)]
 #[command(after_help = "EXAMPLES:\n  \
     wag studio                      on a simulated rig of its own\n  \

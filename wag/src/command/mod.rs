@@ -95,7 +95,7 @@ pub fn run(cli: &Cli) -> Outcome<Option<Value>> {
         Command::Record(args) => record::run(args),
         Command::Replay { run, from_cycle } => runs::replay(run, *from_cycle),
         Command::Explain { run } => runs::explain(run),
-        Command::Export(command) => runs::export(command),
+        Command::Export(command) => command.run().map(Some),
         Command::Report { run, out } => runs::report(run, out.as_deref()),
         Command::Ledger(args) => ledger::run(args),
         Command::Score(args) => score::run(args),

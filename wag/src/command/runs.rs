@@ -1,11 +1,10 @@
-//! What reads a recorded run: `wag replay`, `wag explain`, `wag export`, `wag report`.
+//! What reads a recorded run: `wag replay`, `wag explain`, `wag report`.
 
-use crate::cli::ExportCommand;
 use crate::config;
 use anyhow::Context;
 use cli_output::{OrInput, Outcome, is_interrupted, output};
 use rt_controller::recording::{CORE_VERSION, Gap, Replay};
-use run_log::{CYCLES_TABLE, Explanation, Run, Stop, files};
+use run_log::{Explanation, Run, Stop};
 use serde_json::{Value, json};
 use shared_types::FaultCode;
 use std::path::Path;
@@ -112,34 +111,6 @@ pub fn explain_stop(run: &Path) {
     if let Some(found) = cause.filter(|found| found.stopped && !known(found)) {
         output::remark(format_args!("{}", run_log::show(&found).trim_end()));
     }
-}
-
-/// A recorded run in other formats.
-pub fn export(ExportCommand::Csv { run: path, out }: &ExportCommand) -> Outcome<Option<Value>> {
-    let run = Run::open(path).or_input()?;
-    let recording = run.recording().or_input()?;
-    let recorded = recording.cycles().or_input()?;
-    let Some(first) = recorded.cycles.first() else {
-        return Err(bad_input!("`{}` holds no control cycle", path.display()));
-    };
-    // Zero of the run's other files, if its summary has one.
-    let epoch_ns = run.summary().or_input()?.unwrap_or_default()["epoch_ns"].as_u64();
-    let epoch_ns = epoch_ns.filter(|ns| *ns > 0).unwrap_or(first.deadline_ns);
-    let out = out.as_deref().unwrap_or(run.folder());
-    std::fs::create_dir_all(out)
-        .with_context(|| format!("cannot make the folder `{}`", out.display()))
-        .or_input()?;
-    files::check_writable(&out.join(CYCLES_TABLE)).or_input()?;
-    let written = recorded.write_tables(out, epoch_ns).or_failed()?;
-    for (file, rows) in &written {
-        println!("{} ({rows} rows)", file.display());
-    }
-    let rows = |file: usize| written.get(file).map_or(0, |(_, rows)| *rows);
-    Ok(Some(json!({
-        "ok": true, "command": "export csv", "run": path, "epoch_ns": epoch_ns,
-        "cycles": rows(0), "joints": rows(1), "folder": out,
-        "files": written.iter().map(|(file, _)| file).collect::<Vec<_>>(),
-    })))
 }
 
 /// A run as one HTML file.

@@ -52,6 +52,22 @@ fn python_agrees(file: &Path) {
     assert!(output.status.success(), "{}", said(&output));
 }
 
+/// Published Python libraries find the run in its exports, where they are there.
+fn exports_agree(run: &Path) {
+    let python = missing::named("WAG_SDK_PYTHON", "Python with mcap, numpy and rosbags");
+    let Some(python) = python else {
+        return;
+    };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../.ci/validate-exports");
+    let mut python = Command::new(python);
+    python.arg(script).arg(run).arg(run);
+    let output = python
+        .args(["/joint_states", "/joint_commands", "/tf", "/rosout"])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+}
+
 /// Replays a run, which has no gap and begins with a cycle; what was found.
 fn replays_exactly(run: &str) -> Value {
     let found = json(&format!("replay {run}"))["replay"].clone();
@@ -160,6 +176,10 @@ fn its_file_is_whole(run: &Path) {
         let rows = fs::read_to_string(run.join(format!("{table}.csv"))).unwrap();
         assert_eq!(tables[table], rows.lines().count() - 1, "{table}");
     }
+    for format in ["npz", "ros2"] {
+        json(&format!("export {format} {name}"));
+    }
+    exports_agree(run);
     let shown = counts["/controller/cycles"];
     assert!(shown.abs_diff(exact) < 500, "{exact} cycles, {counts:?}");
     let reported = json(&format!("record recover {}", file.display()));

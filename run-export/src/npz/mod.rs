@@ -1,0 +1,142 @@
+//! A run as arrays for numpy, under the names that `wag.load_run` of the Python package gives
+//! them.
+
+mod file;
+
+use crate::recorded::RecordedRun;
+use crate::written::{Written, WrittenFile};
+use anyhow::Result;
+use arm_model::{JOINTS, JointVector};
+use cli_output::{OrInput, Outcome};
+use file::NpzFile;
+use run_log::{Cycles, files};
+use serde_json::json;
+use shared_types::ipc::{ControllerMode, CycleRecord, JointReport};
+use shared_types::rope::RANGES;
+use shared_types::{FaultCode, KeypointTrack, Plan, RopeParams};
+use std::path::Path;
+
+/// Name of the file, where none is given.
+const FILE: &str = "run.npz";
+
+/// Writes the file `out`, or else `run.npz` in the run's folder: `cycles/…` and `reports/…`, and,
+/// where the run has them, `keypoints/…`, `plan/…` and `rope/…`. Times in ns are those of
+/// CLOCK_MONOTONIC; `epoch_ns` is when the film of the wiggle began, or else the first cycle.
+/// Units are the ends of the names; frames and joints are the first dimension's rows and the
+/// second's columns.
+///
+/// # Errors
+/// The run cannot be read or holds no cycle, or the file cannot be written.
+pub fn npz(run: &Path, out: Option<&Path>) -> Outcome<Written> {
+    let recorded = RecordedRun::read(run)?;
+    let path = out.map_or_else(|| recorded.run.folder().join(FILE), Path::to_owned);
+    files::check_writable(&path).or_input()?;
+    let keypoints = recorded.run.keypoints().or_input()?;
+    let plan = recorded.run.plan().or_input()?;
+    let rope = recorded.run.rope().or_input()?;
+    let lacks = [
+        (keypoints.is_none(), files::KEYPOINTS),
+        (plan.is_none(), files::PLAN),
+        (rope.is_none(), files::ROPE),
+    ];
+    let lacks = lacks.into_iter().filter(|(lacks, _)| *lacks);
+    let missing = lacks.map(|(_, name)| name.to_owned()).collect();
+
+    let mut file = NpzFile::new();
+    let put = |file: &mut NpzFile| -> Result<()> {
+        file.scalar("epoch_ns", recorded.epoch_ns)?;
+        put_cycles(file, &recorded.cycles.cycles)?;
+        put_reports(file, &recorded.cycles)?;
+        keypoints.iter().try_for_each(|k| put_keypoints(file, k))?;
+        plan.iter().try_for_each(|plan| put_plan(file, plan))?;
+        rope.iter().try_for_each(|rope| put_rope(file, rope))
+    };
+    put(&mut file).or_failed()?;
+    let (bytes, count) = file.finish().or_failed()?;
+    files::write_atomic(&path, &bytes).or_failed()?;
+    Ok(Written {
+        run: run.to_owned(),
+        files: vec![WrittenFile {
+            path,
+            count,
+            of: "arrays",
+        }],
+        figures: json!({ "epoch_ns": recorded.epoch_ns, "arrays": count, "bytes": bytes.len() }),
+        missing,
+    })
+}
+
+/// Joints of rows, as a table.
+fn put_joints<T>(
+    file: &mut NpzFile,
+    name: &str,
+    rows: &[T],
+    of: fn(&T) -> &JointVector,
+) -> Result<()> {
+    file.table(name, &[JOINTS], rows.iter().map(|row| &of(row).0[..]))
+}
+
+fn put_cycles(file: &mut NpzFile, cycles: &[CycleRecord]) -> Result<()> {
+    let of = |number: fn(&CycleRecord) -> u64| cycles.iter().map(number);
+    let of_32 = |number: fn(&CycleRecord) -> u32| cycles.iter().map(number);
+    let texts =
+        |text: fn(&CycleRecord) -> String| -> Vec<String> { cycles.iter().map(text).collect() };
+    file.row("cycles/cycle", of(|c| c.cycle))?;
+    file.row("cycles/deadline_ns", of(|c| c.deadline_ns))?;
+    let mode = texts(|c| format!("{:?}", ControllerMode::from_raw(c.mode)));
+    file.texts("cycles/mode", &mode)?;
+    let fault = texts(|c| match FaultCode::from_raw(c.fault) {
+        Some(fault) => format!("{fault:?}"),
+        None => format!("unknown fault {}", c.fault),
+    });
+    file.texts("cycles/fault", &fault)?;
+    file.row("cycles/sent", cycles.iter().map(|c| c.sent != 0))?;
+    file.row("cycles/wake_late_ns", of_32(|c| c.wake_late_ns))?;
+    file.row("cycles/compute_ns", of_32(|c| c.compute_ns))?;
+    file.row("cycles/send_ns", of_32(|c| c.send_ns))?;
+    file.row("cycles/reply_ns", of_32(|c| c.reply_ns))?;
+    file.row("cycles/missed", of_32(|c| c.missed))?;
+    file.row("cycles/trajectory_s", cycles.iter().map(|c| c.trajectory_s))?;
+    put_joints(file, "cycles/q_commanded_rad", cycles, |c| &c.q_c)
+}
+
+fn put_reports(file: &mut NpzFile, cycles: &Cycles) -> Result<()> {
+    let reports = &cycles.reports()[..];
+    let of = |number: fn(&JointReport) -> u64| reports.iter().map(number);
+    file.row("reports/stamp_ns", of(|r| r.stamp_ns))?;
+    file.row("reports/arrival_ns", of(|r| r.arrival_ns))?;
+    put_joints(file, "reports/q_rad", reports, |r| &r.q)?;
+    put_joints(file, "reports/qd_rad_s", reports, |r| &r.qd)?;
+    put_joints(file, "reports/q_target_rad", reports, |r| &r.q_target)
+}
+
+/// As `wag.Track` has them: pixels of the left image as filmed, clamp first, lead's centre last;
+/// times from the film's first frame.
+fn put_keypoints(file: &mut NpzFile, track: &KeypointTrack) -> Result<()> {
+    let (frames, count) = (&track.frames, track.keypoints);
+    file.row("keypoints/t_s", frames.iter().map(|f| f.t_s))?;
+    let points = frames.iter().map(|f| f.points.as_flattened());
+    file.table("keypoints/points_px", &[count, 2], points)?;
+    let confidence = frames.iter().map(|f| &f.confidence[..]);
+    file.table("keypoints/confidence", &[count], confidence)?;
+    file.row("keypoints/lost", frames.iter().map(|f| f.lost))?;
+    file.texts("keypoints/unconfirmed", &track.unconfirmed)
+}
+
+/// As `wag.Plan` has it: a clamped cubic spline from rest to rest through waypoints.
+fn put_plan(file: &mut NpzFile, plan: &Plan) -> Result<()> {
+    let trajectory = &plan.trajectory;
+    file.row("plan/target_m", plan.target_m)?;
+    file.row("plan/times_s", trajectory.times_s().iter().copied())?;
+    put_joints(file, "plan/waypoints_rad", trajectory.waypoints(), |q| q)?;
+    file.scalar("plan/predicted_error_m", plan.predicted_error_m)?;
+    file.scalar("plan/predicted_time_s", plan.predicted_time_s)
+}
+
+/// As `wag.Rope` has it, a number each.
+fn put_rope(file: &mut NpzFile, rope: &RopeParams) -> Result<()> {
+    let parameters = RANGES.iter().zip(rope.to_array());
+    parameters
+        .map(|(range, value)| (format!("rope/{}", range.key), value))
+        .try_for_each(|(name, value)| file.scalar(&name, value))
+}

@@ -1,0 +1,190 @@
+//! A bag of rosbag2: a folder with one MCAP file and what is in it.
+
+use super::definitions::Definition;
+use super::messages::cdr;
+use anyhow::{Context, Result};
+use mcap::records::{MessageHeader, Statistics};
+use mcap::{Compression, WriteOptions, Writer};
+use run_log::files;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+/// What is in the bag.
+pub(super) const METADATA: &str = "metadata.yaml";
+/// The messages.
+pub(super) const MESSAGES: &str = "run_0.mcap";
+/// First line of [`METADATA`], by which an export knows an earlier one.
+pub(super) const MARK: &str = "# Written by `wag export ros2`.\n";
+/// The version of the metadata that ROS 2 Humble writes; every later one reads it.
+const VERSION: u32 = 5;
+
+/// A topic.
+#[derive(Debug)]
+pub(super) struct Topic {
+    /// Its name.
+    pub(super) name: &'static str,
+    /// What its messages are.
+    pub(super) definition: &'static Definition,
+    /// Whether who comes late is told the last message: for what is said only once.
+    pub(super) is_latched: bool,
+}
+
+/// Reliable, to whoever comes late too (`TRANSIENT_LOCAL`); numbers as Humble writes them.
+const LATCHED: &str = "- history: 1
+  depth: 1
+  reliability: 1
+  durability: 1
+  deadline:
+    sec: 9223372036
+    nsec: 854775807
+  lifespan:
+    sec: 9223372036
+    nsec: 854775807
+  liveliness: 1
+  liveliness_lease_duration:
+    sec: 9223372036
+    nsec: 854775807
+  avoid_ros_namespace_conventions: false
+";
+
+impl Topic {
+    /// Nothing is the default.
+    fn quality_of_service(&self) -> &'static str {
+        if self.is_latched { LATCHED } else { "" }
+    }
+}
+
+/// What a topic has been given in the file.
+struct Channel {
+    topic: &'static Topic,
+    id: u16,
+    messages: u32,
+}
+
+/// A bag under way.
+pub(super) struct Bag {
+    writer: Writer<BufWriter<File>>,
+    channels: BTreeMap<&'static str, Channel>,
+}
+
+impl Bag {
+    /// In a folder that is there and empty.
+    pub(super) fn create(folder: &Path) -> Result<Self> {
+        let file = BufWriter::new(File::create(folder.join(MESSAGES))?);
+        let options = WriteOptions::new()
+            .library(format!("wag {}", shared_types::VERSION))
+            .profile("ros2")
+            .compression(Some(Compression::Lz4));
+        Ok(Self {
+            writer: options.create(file)?,
+            channels: BTreeMap::new(),
+        })
+    }
+
+    /// Adds a message of the instant `at_ns` (wall clock).
+    pub(super) fn add(
+        &mut self,
+        topic: &'static Topic,
+        at_ns: u64,
+        message: &impl Serialize,
+    ) -> Result<()> {
+        if !self.channels.contains_key(topic.name) {
+            let channel = self.channel(topic)?;
+            self.channels.insert(topic.name, channel);
+        }
+        let channel = self.channels.get_mut(topic.name);
+        let channel = channel.context("a topic without a channel")?;
+        let header = MessageHeader {
+            channel_id: channel.id,
+            sequence: channel.messages,
+            log_time: at_ns,
+            publish_time: at_ns,
+        };
+        channel.messages += 1;
+        self.writer
+            .write_to_known_channel(&header, &cdr(message)?)?;
+        Ok(())
+    }
+
+    fn channel(&mut self, topic: &'static Topic) -> Result<Channel> {
+        let name = topic.definition.full_name();
+        let text = topic.definition.text();
+        let schema = self.writer.add_schema(&name, "ros2msg", text.as_bytes())?;
+        let quality = topic.quality_of_service().to_owned();
+        let metadata = [("offered_qos_profiles".to_owned(), quality)].into();
+        Ok(Channel {
+            topic,
+            id: self
+                .writer
+                .add_channel(schema, topic.name, "cdr", &metadata)?,
+            messages: 0,
+        })
+    }
+
+    /// Whether a message of the topic is there.
+    pub(super) fn has(&self, topic: &Topic) -> bool {
+        self.channels.contains_key(topic.name)
+    }
+
+    /// Writes the rest, and returns how many messages there are.
+    pub(super) fn finish(mut self, folder: &Path) -> Result<u64> {
+        let found = self.writer.finish()?.stats;
+        let found = found.context("an MCAP file without statistics")?;
+        let file = self.writer.into_inner().into_inner();
+        file.map_err(std::io::IntoInnerError::into_error)?
+            .sync_all()?;
+        let metadata = metadata(&found, self.channels.values())?;
+        files::write_atomic(&folder.join(METADATA), metadata.as_bytes())?;
+        Ok(found.message_count)
+    }
+}
+
+/// The text of [`METADATA`].
+fn metadata<'a>(found: &Statistics, channels: impl Iterator<Item = &'a Channel>) -> Result<String> {
+    let (begin_ns, count) = (found.message_start_time, found.message_count);
+    let duration_ns = found.message_end_time - begin_ns;
+    let mut topics = String::new();
+    for channel in channels {
+        let topic = channel.topic;
+        // A text of JSON is one of YAML.
+        let quality = serde_json::to_string(topic.quality_of_service())?;
+        topics.push_str(&format!(
+            "    - topic_metadata:
+        name: {}
+        type: {}
+        serialization_format: cdr
+        offered_qos_profiles: {quality}
+      message_count: {}
+",
+            topic.name,
+            topic.definition.full_name(),
+            channel.messages
+        ));
+    }
+    Ok(format!(
+        "{MARK}rosbag2_bagfile_information:
+  version: {VERSION}
+  storage_identifier: mcap
+  duration:
+    nanoseconds: {duration_ns}
+  starting_time:
+    nanoseconds_since_epoch: {begin_ns}
+  message_count: {count}
+  topics_with_message_count:
+{topics}  compression_format: \"\"
+  compression_mode: \"\"
+  relative_file_paths:
+    - {MESSAGES}
+  files:
+    - path: {MESSAGES}
+      starting_time:
+        nanoseconds_since_epoch: {begin_ns}
+      duration:
+        nanoseconds: {duration_ns}
+      message_count: {count}
+"
+    ))
+}
