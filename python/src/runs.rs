@@ -38,6 +38,7 @@ pub(crate) fn read_cycles(
     };
     of_cycles.set_item("fault", cycles.iter().map(fault).collect::<Vec<_>>())?;
     of_cycles.set_item("sent", array(py, cycles, |c| c.sent != 0))?;
+    of_cycles.set_item("held_back", array(py, cycles, CycleRecord::held_back))?;
     of_cycles.set_item("wake_late_ns", array(py, cycles, |c| c.wake_late_ns))?;
     of_cycles.set_item("compute_ns", array(py, cycles, |c| c.compute_ns))?;
     of_cycles.set_item("send_ns", array(py, cycles, |c| c.send_ns))?;

@@ -54,6 +54,24 @@ def test_a_run_is_arrays_and_frames(run):
     assert {"q1_rad", "q7_rad", "qd3_rad_s"} <= set(frame.columns) and frame.index.name == "t_s"
 
 
+def test_a_run_exported_for_numpy_is_the_run(run, tmp_path):
+    out = tmp_path / "run.npz"
+    subprocess.run([WAG, "export", "npz", str(run), "--out", str(out)], check=True)
+    found, kept = np.load(out), wag.load_run(run)
+    assert found["epoch_ns"] == kept.epoch_ns
+    for name, table in [("cycles", kept.cycles), ("reports", kept.reports)]:
+        assert {f"{name}/{column}" for column in table} == {
+            key for key in found if key.startswith(f"{name}/")
+        }
+        for column, values in table.items():
+            assert np.array_equal(found[f"{name}/{column}"], values), (name, column)
+    track = kept.keypoints
+    for column in ("t_s", "points_px", "confidence", "lost"):
+        assert np.array_equal(found[f"keypoints/{column}"], getattr(track, column)), column
+    for parameter in wag.PARAMETERS:
+        assert found[f"rope/{parameter.key}"] == getattr(kept.rope, parameter.key), parameter.key
+
+
 def test_the_rope_of_a_run_is_identified_again(run):
     kept = wag.load_run(run)
     found = wag.identify(run, seed=int(kept.summary["seed"]) if "seed" in kept.summary else 0)

@@ -36,11 +36,13 @@ pub fn csv(run: &Path, out: Option<&Path>) -> Outcome<Written> {
     let figures = json!({
         "epoch_ns": recorded.epoch_ns, "cycles": rows(0), "joints": rows(1), "folder": out,
     });
+    let mut missing = recorded.flaws;
+    missing.extend((files.len() < 2).then(|| JOINTS_TABLE.to_owned()));
     Ok(Written {
         run: run.to_owned(),
         files,
         figures,
-        missing: Vec::new(),
+        missing,
     })
 }
 

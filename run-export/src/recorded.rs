@@ -12,6 +12,8 @@ pub(crate) struct RecordedRun {
     pub(crate) cycles: Cycles,
     /// Zero of the run's other files, or else its first cycle (CLOCK_MONOTONIC, ns).
     pub(crate) epoch_ns: u64,
+    /// What is missing of its file, in words.
+    pub(crate) flaws: Vec<String>,
 }
 
 impl RecordedRun {
@@ -29,6 +31,7 @@ impl RecordedRun {
         let epoch_ns = run.summary().or_input()?.unwrap_or_default()["epoch_ns"].as_u64();
         let epoch_ns = epoch_ns.filter(|ns| *ns > 0).unwrap_or(first.deadline_ns);
         Ok(Self {
+            flaws: run.flaws().or_input()?,
             run,
             cycles,
             epoch_ns,

@@ -129,7 +129,30 @@ impl Run {
     ) -> Result<Vec<String>> {
         let fail = || format!("run file `{}`", self.film.display());
         let bytes = std::fs::read(&self.film).map_err(cannot_read(&self.film));
-        let walked = messages(&bytes.with_context(fail)?, each).with_context(fail)?;
+        Self::walk(&bytes.with_context(fail)?, each).with_context(fail)
+    }
+
+    /// What is missing of the run's file, in words; nothing of one that an older version wrote.
+    ///
+    /// # Errors
+    /// The file is there and cannot be read.
+    pub fn flaws(&self) -> Result<Vec<String>> {
+        if !self.film.is_file() {
+            return Ok(Vec::new());
+        }
+        let bytes = std::fs::read(&self.film).map_err(cannot_read(&self.film))?;
+        if is_mcap(&bytes) {
+            Self::walk(&bytes, |_, _, _| Ok(()))
+        } else {
+            Ok(Vec::new())
+        }
+    }
+
+    fn walk(
+        bytes: &[u8],
+        each: impl FnMut(Channel, u64, &[u8]) -> Result<()>,
+    ) -> Result<Vec<String>> {
+        let walked = messages(bytes, each)?;
         let damaged = format!("{} damaged chunks of its file", walked.damaged_chunks);
         let flaws = [
             (walked.damaged_chunks > 0, damaged),

@@ -41,7 +41,7 @@ impl Element for bool {
     }
 }
 
-/// A file under way.
+/// A file that is being written.
 pub(super) struct NpzFile {
     archive: ZipArchiveWriter<Vec<u8>>,
     arrays: u64,

@@ -40,7 +40,8 @@ pub fn npz(run: &Path, out: Option<&Path>) -> Outcome<Written> {
         (rope.is_none(), files::ROPE),
     ];
     let lacks = lacks.into_iter().filter(|(lacks, _)| *lacks);
-    let missing = lacks.map(|(_, name)| name.to_owned()).collect();
+    let lacks = lacks.map(|(_, name)| name.to_owned());
+    let missing = recorded.flaws.iter().cloned().chain(lacks).collect();
 
     let mut file = NpzFile::new();
     let put = |file: &mut NpzFile| -> Result<()> {
@@ -91,6 +92,10 @@ fn put_cycles(file: &mut NpzFile, cycles: &[CycleRecord]) -> Result<()> {
     });
     file.texts("cycles/fault", &fault)?;
     file.row("cycles/sent", cycles.iter().map(|c| c.sent != 0))?;
+    file.row(
+        "cycles/held_back",
+        cycles.iter().map(CycleRecord::held_back),
+    )?;
     file.row("cycles/wake_late_ns", of_32(|c| c.wake_late_ns))?;
     file.row("cycles/compute_ns", of_32(|c| c.compute_ns))?;
     file.row("cycles/send_ns", of_32(|c| c.send_ns))?;
@@ -133,10 +138,13 @@ fn put_plan(file: &mut NpzFile, plan: &Plan) -> Result<()> {
     file.scalar("plan/predicted_time_s", plan.predicted_time_s)
 }
 
-/// As `wag.Rope` has it, a number each.
+/// As `wag.Rope` has it, a number each, and a text of JSON for what few ropes have.
 fn put_rope(file: &mut NpzFile, rope: &RopeParams) -> Result<()> {
-    let parameters = RANGES.iter().zip(rope.to_array());
-    parameters
-        .map(|(range, value)| (format!("rope/{}", range.key), value))
-        .try_for_each(|(name, value)| file.scalar(&name, value))
+    file.scalar("rope/links", rope.links)?;
+    let numbers = RANGES.iter().zip(rope.to_array()).skip(1);
+    for (range, value) in numbers {
+        file.scalar(&format!("rope/{}", range.key), value)?;
+    }
+    let extras = rope.extras.as_ref().map(serde_json::to_string);
+    extras.map_or(Ok(()), |text| file.texts("rope/extras", &[text?]))
 }

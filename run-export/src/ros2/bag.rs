@@ -28,7 +28,7 @@ pub(super) struct Topic {
     pub(super) name: &'static str,
     /// What its messages are.
     pub(super) definition: &'static Definition,
-    /// Whether who comes late is told the last message: for what is said only once.
+    /// Whether late subscribers get the last message (transient local): for what is sent once.
     pub(super) is_latched: bool,
 }
 
@@ -64,10 +64,12 @@ struct Channel {
     messages: u32,
 }
 
-/// A bag under way.
+/// A bag that is being written.
 pub(super) struct Bag {
     writer: Writer<BufWriter<File>>,
     channels: BTreeMap<&'static str, Channel>,
+    /// Whether something could not be written.
+    is_failed: bool,
 }
 
 impl Bag {
@@ -81,7 +83,13 @@ impl Bag {
         Ok(Self {
             writer: options.create(file)?,
             channels: BTreeMap::new(),
+            is_failed: false,
         })
+    }
+
+    /// Whether adding a message has failed: not for what the run holds, but for where it goes.
+    pub(super) fn is_failed(&self) -> bool {
+        self.is_failed
     }
 
     /// Adds a message of the instant `at_ns` (wall clock).
@@ -91,6 +99,12 @@ impl Bag {
         at_ns: u64,
         message: &impl Serialize,
     ) -> Result<()> {
+        let added = self.write(topic, at_ns, message);
+        self.is_failed |= added.is_err();
+        added
+    }
+
+    fn write(&mut self, topic: &'static Topic, at_ns: u64, message: &impl Serialize) -> Result<()> {
         if !self.channels.contains_key(topic.name) {
             let channel = self.channel(topic)?;
             self.channels.insert(topic.name, channel);

@@ -48,7 +48,7 @@ struct Picture {
     format: String,
 }
 
-/// How the left eye sees.
+/// Intrinsics and distortion of the left eye.
 #[derive(Debug, Clone, Deserialize)]
 pub(super) struct Calibration {
     width: u32,
@@ -99,7 +99,7 @@ pub(super) fn joints(at_ns: u64, data: &[u8]) -> Result<JointState> {
     })
 }
 
-/// Places of frames in others.
+/// Transforms between frames.
 pub(super) fn transforms(at_ns: u64, data: &[u8]) -> Result<Vec<TransformStamped>> {
     let Frames { transforms } = serde_json::from_slice(data)?;
     let stamped = |frame: Frame| {

@@ -116,7 +116,7 @@ pub(super) static JOINT_STATE: Definition = made_of(
      float64[] effort\n",
     &[&HEADER, &TIME],
 );
-/// Places of frames.
+/// Transforms between frames.
 pub(super) static TF: Definition = made_of(
     "tf2_msgs",
     "TFMessage",

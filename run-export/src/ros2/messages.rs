@@ -4,7 +4,7 @@
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize, Serializer};
 
-/// Begin of every message: plain CDR, little-endian, no options.
+/// Encapsulation header: plain CDR, little-endian, no options.
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 
 /// A message in CDR. Alignment counts from behind the four bytes at its begin.

@@ -33,7 +33,7 @@ const fn topic(name: &'static str, definition: &'static Definition) -> Topic {
 static MEASURED: Topic = topic("/joint_states", &JOINT_STATE);
 static COMMANDED: Topic = topic("/joint_commands", &JOINT_STATE);
 static FRAMES: Topic = topic("/tf", &TF);
-/// The camera's place is told once, and holds.
+/// The camera's pose, which holds for the whole run.
 static FIXED_FRAMES: Topic = Topic {
     is_latched: true,
     ..topic("/tf_static", &TF)
@@ -70,7 +70,11 @@ pub fn ros2(run: &Path, out: Option<&Path>) -> Outcome<Written> {
     let mut calibration = None;
     let missing = opened
         .messages(|channel, at_ns, data| add(&mut bag, &mut calibration, channel, at_ns, data));
-    let mut missing = missing.or_input()?;
+    let mut missing = if bag.is_failed() {
+        missing.with_context(fail).or_failed()?
+    } else {
+        missing.or_input()?
+    };
     let absent = ALL.iter().filter(|topic| !bag.has(topic));
     let absent: Vec<_> = absent.map(|topic| topic.name.to_owned()).collect();
     if absent.len() == ALL.len() {

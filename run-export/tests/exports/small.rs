@@ -22,6 +22,8 @@ pub(crate) const PICTURES: u64 = 5;
 /// When it began (CLOCK_MONOTONIC, ns), and how far the wall clock was ahead (ns).
 const BEGIN_NS: u64 = 7_000_000_123;
 const AHEAD_NS: u64 = 1_700_000_000_000_000_001;
+/// A rotation other than none, so that it is told from the intrinsics.
+const TURNED: [f64; 9] = [0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 const NINE: [f64; 9] = [500.0, 0.0, 320.5, 0.0, 501.0, 180.5, 0.0, 0.0, 1.0];
 
 /// Writes it into a folder that is not there yet.
@@ -163,7 +165,7 @@ fn film(file: &mut McapFile) {
     let wall_ns = AHEAD_NS + BEGIN_NS;
     let eye = json!({
         "width": 640, "height": 360, "distortion_model": "plumb_bob",
-        "D": [-0.17, 0.02, 4e-4, -3e-4, -0.002], "K": NINE, "R": NINE,
+        "D": [-0.17, 0.02, 4e-4, -3e-4, -0.002], "K": NINE, "R": TURNED,
         "P": [500.0, 0.0, 320.5, 0.0, 0.0, 501.0, 180.5, 0.0, 0.0, 0.0, 1.0, 0.25],
     });
     file.json(Channel::Calibration, wall_ns, &eye).unwrap();
