@@ -114,6 +114,15 @@ fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
     })
 }
 
+/// Whether a shard's file has all its trials.
+///
+/// # Errors
+/// It cannot be read, or is of another version.
+pub fn is_finished(shard: &Path) -> anyhow::Result<bool> {
+    let found: Checkpoint<Box<RawValue>> = read(shard)?;
+    Ok(found.trials.len() as u64 == found.shard.len(found.origin.count))
+}
+
 /// Writes the trials of all shards into one file, byte for byte as one process would have; how
 /// many they are.
 ///

@@ -25,7 +25,7 @@ mod strikes;
 mod sysid;
 mod wiggles;
 
-pub use checkpoint::merge as join;
+pub use checkpoint::{is_finished, merge as join};
 
 use crate::args::{MergeArgs, ResultArgs, ResultCommand};
 use cli_output::{OrInput, Outcome};

@@ -6,6 +6,7 @@ use crate::args::SubmitArgs;
 use anyhow::{Context, bail};
 use serde_json::json;
 use std::fs::File;
+use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -36,19 +37,31 @@ impl HyperQueue {
 
     fn failed(&self) -> anyhow::Error {
         let said = std::fs::read_to_string(&self.log).unwrap_or_default();
-        let last = said.lines().rfind(|line| !line.trim().is_empty());
+        let mut lines = said.lines().map(str::trim);
+        let cause = lines.rfind(|line| !line.is_empty());
+        let cause = cause.unwrap_or("it said nothing");
+        let remedy = if cause.contains("ModuleNotFoundError") {
+            let python = self.python.display();
+            format!(
+                "install the package hyperqueue for `{python}` (pip install hyperqueue), in the server's version, or name another by --python"
+            )
+        } else {
+            "does a server run, of the package's version, in the folder HQ_SERVER_DIR, or in ~/.hq-server without it?".to_owned()
+        };
+        let log = self.log.display();
         anyhow::anyhow!(
-            "HyperQueue's client failed: {}. It needs the package hyperqueue of the server's version in `{}` (pip install hyperqueue; --python names another) and a server that runs, found by HQ_SERVER_DIR or in ~/.hq-server; all that it said is in `{}`",
-            last.unwrap_or("it said nothing").trim(),
-            self.python.display(),
-            self.log.display()
+            "HyperQueue's client failed: {cause}; {remedy} All that it said is in `{log}`"
         )
     }
 }
 
 impl Engine for HyperQueue {
     fn submit(&mut self, shards: &Shards, numbers: &[u64]) -> anyhow::Result<()> {
-        let log = File::create(&self.log).with_context(|| format!("`{}`", self.log.display()))?;
+        let log = File::options()
+            .create(true)
+            .append(true)
+            .open(&self.log)
+            .with_context(|| format!("`{}`", self.log.display()))?;
         let tasks: Vec<_> = numbers.iter().map(|n| (*n, shards.log(*n))).collect();
         let given = json!({
             "script": shards.script(), "token": shards.token(), "threads": self.threads,
@@ -62,9 +75,10 @@ impl Engine for HyperQueue {
         let mut client = command
             .spawn()
             .with_context(|| format!("cannot start `{}` (--python)", self.python.display()))?;
-        if let Some(input) = client.stdin.take() {
-            // One that has ended has said why in its log.
-            let _ = serde_json::to_writer(input, &given);
+        // It stays open: by its end the client knows that this program has ended.
+        if let Some(input) = &mut client.stdin {
+            // A client that has ended has said why in its log.
+            let _ = writeln!(input, "{given}");
         }
         self.client = Some(client);
         Ok(())

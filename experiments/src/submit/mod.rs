@@ -30,7 +30,9 @@ use std::time::{Duration, Instant};
 const LOOK: Duration = Duration::from_millis(500);
 /// How long after its end a shard's mark may come to be seen here: a network's file system is
 /// not at once the same everywhere.
-const SEEN_AFTER: Duration = Duration::from_secs(5);
+const SEEN_AFTER: Duration = Duration::from_secs(30);
+/// After this long without a shard that has been begun, that is told.
+const IDLE: Duration = Duration::from_secs(60);
 /// Arguments that are this command's to give.
 const OWN: [&str; 4] = ["--out", "--shard", "--threads", "--json"];
 
@@ -78,6 +80,7 @@ pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
         }
         engine.submit(&shards, &missing).or_failed()?;
         watch(engine.as_mut(), &shards, seen_after, &stage)?;
+        shards.unmark_unfinished().or_failed()?;
     }
     let missing = shards.missing();
     if let Some(first) = missing.first() {
@@ -102,7 +105,8 @@ pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
 
 /// Waits until all that was handed over has ended, and for marks that are seen later.
 fn watch(engine: &mut dyn Engine, shards: &Shards, seen_after: Duration, stage: &Stage) -> Outcome {
-    let mut over: Option<Instant> = None;
+    let begin = Instant::now();
+    let (mut over, mut is_idle): (Option<Instant>, _) = (None, !shards.is_any_begun());
     loop {
         let missing = shards.missing().len() as u64;
         let done = shards.count() - missing;
@@ -118,6 +122,14 @@ fn watch(engine: &mut dyn Engine, shards: &Shards, seen_after: Duration, stage: 
             value: done as f64,
             label: "shards".to_owned(),
         });
+        is_idle = is_idle && !shards.is_any_begun();
+        if is_idle && begin.elapsed() > IDLE {
+            is_idle = false;
+            eprintln!(
+                "no shard has begun for {} s: has the engine workers that are large enough?",
+                IDLE.as_secs()
+            );
+        }
         if over.is_none() && engine.is_over(shards).or_failed()? {
             over = Some(Instant::now());
         }

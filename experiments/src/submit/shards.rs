@@ -2,11 +2,13 @@
 
 use crate::args::SubmitArgs;
 use crate::program::program;
-use anyhow::{Context, ensure};
+use crate::results::is_finished;
+use anyhow::{Context, bail, ensure};
 use rope_sim::Precision;
 use run_log::files;
 use serde_json::{Value, json};
-use std::fs::{File, Permissions};
+use std::collections::HashSet;
+use std::fs::{File, Permissions, TryLockError};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -34,11 +36,17 @@ impl Shards {
         files::create_folder(&folder)?;
         let folder = folder.canonicalize()?;
         let lock = File::create(folder.join("lock")).context("the shards' lock")?;
-        ensure!(
-            lock.try_lock().is_ok(),
-            "another command makes the shards in `{}`: wait for it, or name another --out",
-            folder.display()
-        );
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => bail!(
+                "another command makes the shards in `{}`: wait for it, or name another --out",
+                folder.display()
+            ),
+            Err(TryLockError::Error(error)) => eprintln!(
+                "no lock in `{}` ({error}): let no other command make the same shards",
+                folder.display()
+            ),
+        }
         let kept = folder.join("study.json");
         let kernels = [Precision::F32, Precision::F64].map(Precision::fastest_kernel);
         let study = json!({
@@ -66,12 +74,12 @@ impl Shards {
         Ok(shards)
     }
 
-    /// Where they lie.
+    /// Folder of scripts, logs and result files (absolute).
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// How many they are.
+    /// Number of shards.
     pub fn count(&self) -> u64 {
         self.count
     }
@@ -101,19 +109,41 @@ impl Shards {
         self.folder.join("submission")
     }
 
-    /// Whether a shard's script has left its mark.
-    pub fn is_made(&self, number: u64) -> bool {
-        let mark = self.folder.join(format!("shard-{number}.done"));
-        mark.exists() && self.file(number).exists()
+    /// Left by a shard's script at its end.
+    fn mark(&self, number: u64) -> PathBuf {
+        self.folder.join(format!("shard-{number}.done"))
     }
 
-    /// Those that are not made yet.
+    /// Those that are not made yet. The folder is read as a whole: a network's file system then
+    /// looks for what is new.
     pub fn missing(&self) -> Vec<u64> {
-        let all = 1..=self.count;
-        all.filter(|number| !self.is_made(*number)).collect()
+        let entries = std::fs::read_dir(&self.folder).into_iter().flatten();
+        let there: HashSet<_> = entries.flatten().map(|entry| entry.file_name()).collect();
+        let is_there = |path: PathBuf| path.file_name().is_some_and(|name| there.contains(name));
+        let is_made = |number| is_there(self.mark(number)) && is_there(self.file(number));
+        (1..=self.count)
+            .filter(|number| !is_made(*number))
+            .collect()
     }
 
-    /// Writes the script.
+    /// Whether a shard has been begun, here or by an earlier submission.
+    pub fn is_any_begun(&self) -> bool {
+        (1..=self.count).any(|number| self.log(number).exists())
+    }
+
+    /// Takes the marks from shards that are not finished: made twice at once, after an engine had
+    /// given one up too early, a shard may be written by the slower one last.
+    pub fn unmark_unfinished(&self) -> anyhow::Result<()> {
+        let missing: HashSet<u64> = self.missing().into_iter().collect();
+        for number in (1..=self.count).filter(|number| !missing.contains(number)) {
+            if !is_finished(&self.file(number))? {
+                std::fs::remove_file(self.mark(number))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the script; a mark makes it do nothing.
     pub fn write_script(&self, program: &Path, args: &SubmitArgs) -> anyhow::Result<()> {
         let here = std::env::current_dir().context("the current folder")?;
         let study: Vec<String> = args.study.iter().map(|word| quoted(word)).collect();
@@ -126,7 +156,11 @@ impl Shards {
              n=\"$1\"\n\
              folder={folder}\n\
              # Of a submission that has ended, a queue may still hold shards.\n\
-             [ $# -lt 2 ] || [ \"$2\" = \"$(cat \"$folder/submission\" 2>&1)\" ] || exit 0\n\
+             if [ $# -ge 2 ] && [ \"$2\" != \"$(cat \"$folder/submission\")\" ]; then\n\
+             \x20 echo \"not made: its submission has ended\" >&2\n\
+             \x20 exit 0\n\
+             fi\n\
+             [ ! -e \"$folder/shard-$n.done\" ] || exit 0\n\
              cd {here}\n\
              {program} {study} --threads {threads} --shard \"$n/{count}\" --out \"$folder/shard-$n.json\"\n\
              : > \"$folder/shard-$n.done\"\n",

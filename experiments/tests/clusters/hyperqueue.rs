@@ -3,6 +3,7 @@
 use crate::support::missing;
 use crate::{Daemon, Submission, by_one, wait_for};
 use rustix::process::{Pid, Signal, kill_process};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -102,16 +103,24 @@ fn without_a_server_it_says_so() {
     let Some(python) = missing::named("WAG_SDK_PYTHON", "Python with hyperqueue") else {
         return;
     };
-    for (python, word) in [
-        (Path::new(&python), "HQ_SERVER_DIR"),
-        (Path::new("/bin/false"), "pip install hyperqueue"),
-        (Path::new("/no/python"), "--python"),
+    let nowhere = dir.path().join("nowhere");
+    let without = dir.path().join("without");
+    let words =
+        "#!/bin/sh\necho \"ModuleNotFoundError: No module named 'hyperqueue'\" >&2\nexit 1\n";
+    std::fs::write(&without, words).unwrap();
+    std::fs::set_permissions(&without, PermissionsExt::from_mode(0o755)).unwrap();
+    for (python, words) in [
+        (Path::new(&python), ["failed: ", "does a server run"]),
+        (&without, ["No module named", "pip install hyperqueue"]),
+        (Path::new("/no/python"), ["/no/python", "--python"]),
     ] {
         let engine = format!("hyperqueue --python {}", python.display());
-        let nowhere = dir.path().join("nowhere");
         let output = Submission::start(dir.path(), &engine, ("HQ_SERVER_DIR", &nowhere)).output();
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{said}");
-        assert!(said.contains(word), "{said} lacks {word}");
+        for word in words {
+            assert!(said.contains(word), "{said} lacks {word}");
+        }
+        assert!(!said.contains("it said nothing"), "{said}");
     }
 }

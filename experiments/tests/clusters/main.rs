@@ -7,6 +7,7 @@ mod support;
 mod hyperqueue;
 mod slurm;
 
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -36,9 +37,9 @@ impl Daemon {
         }
     }
 
-    /// Kills it as a machine that fails would.
+    /// Kills it with all that it has started, as a machine that fails would.
     fn kill(&mut self) {
-        self.child.kill().unwrap();
+        kill_with_children(self.child.id());
         self.child.wait().unwrap();
     }
 
@@ -58,6 +59,16 @@ impl Drop for Daemon {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+fn kill_with_children(pid: u32) {
+    let children = std::fs::read_to_string(format!("/proc/{pid}/task/{pid}/children"));
+    let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
+    // It may have ended by itself.
+    let _ = pid.map(|pid| kill_process(pid, Signal::KILL));
+    let children = children.unwrap_or_default();
+    let children = children.split_whitespace();
+    children.for_each(|child| kill_with_children(child.parse().unwrap()));
 }
 
 fn wait_for(what: &str, mut is_so: impl FnMut() -> bool) {
@@ -116,6 +127,9 @@ impl Submission {
     }
 
     fn output(mut self) -> Output {
+        wait_for("the submission's end", || {
+            self.child.as_mut().unwrap().try_wait().unwrap().is_some()
+        });
         self.child.take().unwrap().wait_with_output().unwrap()
     }
 

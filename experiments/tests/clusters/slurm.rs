@@ -61,7 +61,8 @@ impl Cluster {
             command.arg("-D").args(arguments).env("SLURM_CONF", &config);
             Daemon::start(&mut command, &at(log))
         };
-        let controller = daemon(CONTROLLER, &[], "controller.out");
+        let mut controller = daemon(CONTROLLER, &[], "controller.out");
+        controller.wait_until(|| at("controller.pid").exists());
         let node = |name: &&str| daemon(NODE, &["-N", name], &format!("{name}.out"));
         let nodes = ["n1", "n2"].iter().map(node).collect();
         let cluster = Self {
@@ -85,7 +86,8 @@ impl Cluster {
         self.ask("sinfo", &["--noheader", "--states=idle", "--format=%D"])
     }
 
-    /// Kills the first node as a machine that fails would: its daemon and all that it runs.
+    /// Kills the first node's daemon, and what it runs but for Slurm's own step, which tells the
+    /// controller that its task has failed.
     fn fail_first_node(&mut self) {
         self.nodes[0].kill();
         let of_cluster = format!("SLURM_CONF={}", self.config.display());
@@ -140,6 +142,7 @@ fn configuration(dir: &Path) -> String {
          SlurmctldLogFile={dir}/controller.log\n\
          SlurmdLogFile={dir}/%n.log\n\
          SlurmdTimeout=5\n\
+         ReturnToService=2\n\
          SchedulerParameters=sched_interval=2,batch_sched_delay=0\n\
          NodeName=n1 NodeHostname={host} NodeAddr=127.0.0.1 Port={first} CPUs=1 State=UNKNOWN\n\
          NodeName=n2 NodeHostname={host} NodeAddr=127.0.0.1 Port={second} CPUs=1 State=UNKNOWN\n\
@@ -156,7 +159,9 @@ fn two_nodes_make_the_bytes_of_one_process() {
     let one = by_one(dir.path());
     let submission = cluster.submit(dir.path());
     assert_eq!(submission.report(&one)["trials"], 24);
-    assert_eq!(cluster.ask("squeue", &["--noheader"]), "");
+    wait_for("the end of all jobs", || {
+        cluster.ask("squeue", &["--noheader"]).is_empty()
+    });
 }
 
 #[test]
