@@ -5,7 +5,7 @@
     python benches/python/rate.py target/release/examples/batch_rate
 
 Both simulate the same ropes through the same wiggle, in turns; the first turn of each is left
-out. Of Python everything counts: the call, the arrays that it makes, their release.
+out. Of Python everything counts, also the release of what it made, which is not timed of the other.
 """
 
 import argparse
@@ -21,6 +21,7 @@ parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 parser.add_argument("native", help="planner's example batch_rate, built")
 parser.add_argument("--ropes", type=int, default=4096)
 parser.add_argument("--turns", type=int, default=15)
+parser.add_argument("--threads", type=int, default=wag.simulation.THREADS)
 parser.add_argument("--rate-hz", type=int, default=0, help="keep nodes at this rate")
 given = parser.parse_args()
 
@@ -37,6 +38,7 @@ def by_python() -> float:
         point_m=(0.9, 0.0, 0.1),
         precision="f32",
         rate_hz=given.rate_hz or None,
+        threads=given.threads,
     )
     assert found.point is not None and len(found.point.distance_m) == given.ropes
     del found
@@ -44,7 +46,7 @@ def by_python() -> float:
 
 
 with subprocess.Popen(
-    [given.native, str(given.ropes), str(given.rate_hz)],
+    [given.native, *map(str, (given.ropes, given.rate_hz, given.threads))],
     stdin=subprocess.PIPE,
     stdout=subprocess.PIPE,
     text=True,

@@ -1,7 +1,7 @@
 //! How fast a batch of ropes is simulated, beside the Python package: `benches/python/rate.py`.
 //!
-//! `batch_rate ROPES FRAMES_HZ`: for every line of standard input one batch, wiggled, on all
-//! processors in single precision; for every batch a line with its seconds.
+//! `batch_rate ROPES FRAMES_HZ THREADS`: for every line of standard input one batch, wiggled, in
+//! single precision; for every batch a line with its seconds.
 #![allow(clippy::expect_used, reason = "a measuring program may stop loudly")]
 
 use planner::ropes::random_rope;
@@ -18,10 +18,10 @@ const POINT_M: [f64; 3] = [0.9, 0.0, 0.1];
 fn main() {
     let mut args = std::env::args().skip(1);
     let mut number = || {
-        let word = args.next().expect("batch_rate ROPES FRAMES_HZ");
+        let word = args.next().expect("batch_rate ROPES FRAMES_HZ THREADS");
         word.parse::<u32>().expect("a number")
     };
-    let (ropes, frames_hz) = (u64::from(number()), number());
+    let (ropes, frames_hz, threads) = (u64::from(number()), number(), number());
     let ropes: Vec<_> = (0..ropes).map(random_rope).collect();
     let arm = wiggling_arm(&WiggleConfig::default()).expect("the usual wiggle");
     let candidates: Vec<_> = ropes
@@ -40,7 +40,7 @@ fn main() {
     let options = SimOptions {
         frames,
         watch: Watch::NOTHING,
-        threads: std::thread::available_parallelism().map_or(1, usize::from),
+        threads: threads as usize,
         ..SimOptions::new(STEP_S, Precision::F32, HORIZON_S)
     };
     for line in std::io::stdin().lines() {

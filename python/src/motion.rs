@@ -1,6 +1,7 @@
 //! How the clamp moves.
 
 use crate::error::OrRaise;
+use crate::simulate::THREADS_MAX;
 use anyhow::{Context, anyhow, ensure};
 use arm_model::limits::{LimitKind, Margin};
 use arm_model::{Cell, JOINTS, JointTrajectory, JointVector, Limits, Pole};
@@ -24,12 +25,14 @@ type Numbers3<'py> = PyArrayLike3<'py, f64, AllowTypeChange>;
 /// One number for each throw.
 type Array<'py, T> = Bound<'py, PyArray1<T>>;
 
-/// What `make` gives for 0 to `count`, in that order.
-fn on_all_processors<T: Send>(
+/// What `make` gives for 0 to `count`, in that order, on so many threads or else all processors.
+fn on_threads<T: Send>(
+    threads: Option<usize>,
     count: usize,
     make: &(impl Fn(usize) -> anyhow::Result<T> + Sync),
 ) -> anyhow::Result<Vec<T>> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let processors = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = threads.unwrap_or_else(processors).clamp(1, THREADS_MAX);
     let each = count.div_ceil(threads).max(1);
     let part = |first: usize| -> anyhow::Result<Vec<T>> {
         (first..(first + each).min(count)).map(make).collect()
@@ -261,13 +264,14 @@ impl Motion {
     /// as a whole until the arm's limits of speed and acceleration hold. With them how much each
     /// was slowed, 1 for not at all, and whether all its joints stay within their ranges.
     #[staticmethod]
-    #[pyo3(signature = (times_s, q_rad, *, limits = None, cell = None))]
+    #[pyo3(signature = (times_s, q_rad, *, limits = None, cell = None, threads = None))]
     fn throws<'py>(
         py: Python<'py>,
         times_s: Numbers2<'py>,
         q_rad: Numbers3<'py>,
         limits: Option<PathBuf>,
         cell: Option<PathBuf>,
+        threads: Option<usize>,
     ) -> PyResult<(Vec<Self>, Array<'py, f64>, Array<'py, bool>)> {
         let (t, q) = (times_s.as_array().to_owned(), q_rad.as_array().to_owned());
         let (count, waypoints) = t.dim();
@@ -285,7 +289,7 @@ impl Motion {
             let q: Vec<JointVector> = (0..waypoints).map(row).collect();
             slowed(&times_s, &q, &limits).with_context(|| format!("throw {i}"))
         };
-        let slowed = py.detach(|| on_all_processors(count, &slow)).or_input()?;
+        let slowed = py.detach(|| on_threads(threads, count, &slow)).or_input()?;
         let factors = slowed.iter().map(|s| s.factor).collect::<Vec<f64>>();
         let within = slowed
             .iter()

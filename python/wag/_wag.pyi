@@ -48,6 +48,7 @@ class Motion:
         *,
         limits: _Path | None = None,
         cell: _Path | None = None,
+        threads: int | None = None,
     ) -> tuple[list[Motion], _Floats, npt.NDArray[np.bool_]]:
         """Throws through (throws, waypoints, 7) at (throws, waypoints), each slowed down as a
         whole until the arm's limits hold; how much each was slowed, and whether its joints stay

@@ -141,7 +141,9 @@ class ThrowVectorEnv(VectorEnv):
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, Floats, np.ndarray, np.ndarray, dict[str, Any]]:
-        motions, slowed, is_within = Motion.throws(*self.throws(actions))
+        motions, slowed, is_within = Motion.throws(
+            *self.throws(actions), threads=self.threads
+        )
         found = simulate(
             self._trials.ropes,
             motions,
