@@ -2,7 +2,7 @@
 
 use crate::error::{OrRaise, interruptible, raised};
 use crate::motion::{Motion, cell_of};
-use crate::simulate::THREADS_MAX;
+use crate::threads::THREADS_MAX;
 use anyhow::Context;
 use camera_ingest::source::read_film;
 use camera_ingest::{load_camera, open_video};

@@ -14,6 +14,7 @@ mod rope;
 mod runs;
 mod simulate;
 mod stepwise;
+mod threads;
 mod throw;
 
 /// Ropes, films, throws and runs; see the package `wag`, which is made of it.

@@ -3,6 +3,7 @@
 use crate::error::OrRaise;
 use crate::motion::Motion;
 use crate::rope::ropes_of_table;
+use crate::threads::THREADS_MAX;
 use anyhow::{anyhow, ensure};
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
@@ -14,8 +15,6 @@ use rope_sim::{
 };
 use shared_types::RopeParams;
 
-/// Threads beyond which more make nothing faster.
-pub(crate) const THREADS_MAX: usize = 1024;
 /// Most numbers that one call may give back: 8 GB in double precision.
 pub(crate) const NUMBERS_MAX: u128 = 1_000_000_000;
 

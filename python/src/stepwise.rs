@@ -3,7 +3,8 @@
 use crate::error::OrRaise;
 use crate::motion::cell_of;
 use crate::rope::ropes_of_table;
-use crate::simulate::{NUMBERS_MAX, THREADS_MAX};
+use crate::simulate::NUMBERS_MAX;
+use crate::threads::THREADS_MAX;
 use anyhow::ensure;
 use arm_model::{JOINTS, JointState, JointVector, Pole};
 use numpy::ndarray::{Array2, Array3, ArrayView2};

@@ -4,7 +4,7 @@ use crate::error::{OrRaise, interruptible, of_plan};
 use crate::film::config_of;
 use crate::motion::{cell_of, limits_of};
 use crate::rope::rope_of_json;
-use crate::simulate::THREADS_MAX;
+use crate::threads::THREADS_MAX;
 use anyhow::{Context, ensure};
 use planner::arm_response::Following;
 use planner::plan::{PlanOptions, PlanRequest, PosteriorEnsemble, shortcoming, warnings};
