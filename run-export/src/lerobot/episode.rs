@@ -162,7 +162,7 @@ fn gaps(recorded: &RecordedRun, tracks: &Tracks<'_>, grid: Grid) -> Vec<String> 
         let (count, total_s) = (gaps_s.len(), gaps_s.iter().sum::<f64>());
         let longest_s = gaps_s.into_iter().fold(0.0, f64::max);
         format!(
-            "no {what} in {count} gaps over 0.25 s, {total_s:.1} s in all, the longest \
+            "gaps over 0.25 s without {what}: {count}, {total_s:.1} s in all, the longest \
              {longest_s:.1} s"
         )
     };

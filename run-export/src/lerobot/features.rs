@@ -22,16 +22,16 @@ pub(super) struct Place {
 pub(super) struct Feature {
     /// As `info.json` describes it: type, shape and names.
     pub(super) described: Value,
-    /// Its values.
+    /// Its values of all frames, a row each.
     pub(super) column: Column,
-    /// Its statistics.
+    /// The same values without their order, each element apart.
     pub(super) gathered: FeatureValues,
 }
 
 /// What the statistics of a feature are made of.
 #[derive(Debug, Clone)]
 pub(super) struct FeatureValues {
-    /// Name of the feature.
+    /// The feature's, as `info.json` has it.
     pub(super) name: String,
     /// Shape of each statistic; the library spreads it over the feature's own.
     pub(super) shape: Vec<usize>,

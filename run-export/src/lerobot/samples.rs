@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn joints_are_taken_in_proportion_and_hold_at_the_ends() {
+    fn joints_are_interpolated_and_hold_at_the_ends() {
         let at = |q| JointVector::splat(q);
         let samples = Samples::new([(100, at(1.0)), (200, at(3.0))].into_iter());
         let found = [0, 100, 125, 200, 300].map(|t| samples.between(t).unwrap()[6]);

@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_between_two_values_are_in_proportion() {
+    fn quantiles_between_two_values_are_interpolated() {
         let found = Distribution::of([4.0, 2.0].into_iter())
             .statistics()
             .unwrap();

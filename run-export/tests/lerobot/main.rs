@@ -216,7 +216,7 @@ fn what_is_wrong_with_a_run_is_told_with_its_name() {
     };
     let [of_good, of_bad] = [&good, &bad].map(of);
     // From cycle 99 to cycle 200, 4 ms each.
-    let gap = "no control cycles in 1 gaps over 0.25 s, 0.4 s in all, the longest 0.4 s";
+    let gap = "gaps over 0.25 s without control cycles: 1, 0.4 s in all, the longest 0.4 s";
     assert!(of_bad.contains(gap), "{of_bad}");
     assert!(of_bad.contains("`ok: false`"), "{of_bad}");
     assert!(of_bad.contains("no keypoints"), "{of_bad}");
