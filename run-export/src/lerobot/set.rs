@@ -39,13 +39,13 @@ fn sizes(folder: &Path) -> io::Result<BTreeMap<String, u64>> {
         let entry = entry?;
         // That of a link itself, which is not followed.
         let kind = entry.file_type()?;
-        let name = entry.file_name().into_string();
-        let name = name.map_err(|_| io::ErrorKind::InvalidData)?;
+        let name = entry.file_name();
+        let name = name.to_str().ok_or(io::ErrorKind::InvalidData)?;
         if kind.is_dir() {
             let below = self::sizes(&entry.path())?.into_iter();
             sizes.extend(below.map(|(path, bytes)| (format!("{name}/{path}"), bytes)));
         } else if kind.is_file() {
-            sizes.insert(name, entry.metadata()?.len());
+            sizes.insert(name.to_owned(), entry.metadata()?.len());
         } else {
             return Err(io::ErrorKind::InvalidData.into());
         }
