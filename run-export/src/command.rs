@@ -63,7 +63,11 @@ impl ExportCommand {
             println!("{} ({} {})", file.path.display(), file.count, file.of);
         }
         for missing in &written.missing {
-            output::remark(format_args!("not in this run: {missing}"));
+            match self {
+                // Of several runs, each flaw names its own.
+                Self::Lerobot(_) => output::remark(format_args!("{missing}")),
+                _ => output::remark(format_args!("not in this run: {missing}")),
+            }
         }
         Ok(written.report(format))
     }

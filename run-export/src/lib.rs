@@ -1,9 +1,9 @@
 //! A recorded run in the formats of other programs, for those who work on it with their own.
 //!
-//! Each format is a module with one function of the type [`Write`]. It reads the run through
-//! [`run_log::Run`], which it never changes, and writes whole files or whole folders: what
-//! fails leaves nothing behind. Wrong input is told apart from a failure to write, as
-//! [`cli_output::Failure`] has it.
+//! Each format is a module with one function: of the type [`Write`], but for [`lerobot()`], which
+//! takes several runs. It reads a run through [`run_log::Run`], which it never changes, and writes
+//! whole files or whole folders: what fails leaves nothing behind. Wrong input is told apart from a
+//! failure to write, as [`cli_output::Failure`] has it.
 //!
 //! ```no_run
 //! # fn main() -> cli_output::Outcome {

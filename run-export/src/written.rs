@@ -23,7 +23,8 @@ pub struct Written {
     pub files: Vec<WrittenFile>,
     /// What else a program wants to know of it: a JSON object.
     pub figures: Value,
-    /// What the run lacks that the format has a place for.
+    /// What the run lacks that the format has a place for; of several runs, each entry is a
+    /// sentence that names its run.
     pub missing: Vec<String>,
 }
 

@@ -24,16 +24,16 @@ pub(super) enum Values {
     Singles(Vec<f32>),
     /// Numbers in double precision.
     Doubles(Vec<f64>),
-    /// Texts.
+    /// Texts, in UTF-8.
     Texts(Vec<String>),
-    /// Compressed pictures, and what each would be called as a file.
+    /// JPEGs, and what each would be called as a file.
     Pictures(Vec<ByteArray>, Vec<String>),
 }
 
 /// A column.
 #[derive(Debug, Clone)]
 pub(super) struct Column {
-    /// Its name.
+    /// The feature's, or that of a column of `meta/`.
     pub(super) name: String,
     /// Lengths of the lists in a row, the outermost first; none for single values.
     pub(super) lengths: Vec<usize>,

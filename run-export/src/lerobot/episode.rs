@@ -9,7 +9,7 @@ use arm_model::JointVector;
 use cli_output::{OrInput, Outcome};
 use parquet::data_type::ByteArray;
 use run_log::{Run, files};
-use shared_types::{MonotonicNs, Task};
+use shared_types::{KeypointTrack, MonotonicNs, Task};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -27,16 +27,18 @@ pub(super) struct Episode {
     pub(super) kind: Kind,
     /// How many frames it has.
     pub(super) frames: usize,
-    /// Measured joints (rad), between two reports in proportion; seven a frame.
+    /// Measured joints (rad), linearly interpolated between reports; seven a frame.
     pub(super) state: Vec<f32>,
     /// The newest setpoint that was sent (rad); seven a frame.
     pub(super) action: Vec<f32>,
     /// The rope's keypoints in the frame's picture (px): `u` and `v` of each, from the clamp on;
-    /// no numbers where the rope was not tracked.
+    /// NaN where the rope was not tracked.
     pub(super) keypoints: Vec<f32>,
     /// The left image.
     pub(super) pictures: Option<Pictures>,
-    /// What the run lacks.
+    /// Frames that show the same picture as the frame before.
+    pub(super) repeats: usize,
+    /// What the run lacks or has wrong, with its name.
     pub(super) missing: Vec<String>,
 }
 
@@ -103,15 +105,28 @@ impl Episode {
             Some(_) => (shown.iter().map(|(at_ns, _)| *at_ns).collect(), SAME_NS),
             None => (grid.instants().collect(), grid.half_ns()),
         };
-        let (count, keypoints) = keypoints(recorded, &looked_ns, within_ns)?;
-
-        let gaps = [
-            ("pictures", grid.gap_s(&tracks.seen)),
-            ("measured joints", grid.gap_s(&tracks.measured)),
-        ];
-        let told = |(what, gap_s): (&str, Option<f64>)| {
-            Some(format!("{what} of {:.1} s of `{}`", gap_s?, path.display()))
+        let track = run.keypoints()?;
+        let (count, keypoints) = match &track {
+            Some(track) => keypoints(track, recorded.epoch_ns, &looked_ns, within_ns),
+            None => (0, Vec::new()),
         };
+
+        let repeats = shown.windows(2).filter(|pair| pair[0].0 == pair[1].0);
+        let repeats = repeats.count();
+        let mut flaws = gaps(recorded, &tracks, grid);
+        if repeats > 0 {
+            let frames = grid.frames;
+            flaws.push(format!(
+                "{repeats} of {frames} frames repeat the picture before"
+            ));
+        }
+        if track.is_some() && count == 0 {
+            flaws.push("no keypoints, as none of those tracked are of its frames".to_owned());
+        }
+        if run.summary()?.unwrap_or_default()["ok"] == false {
+            flaws.push("it ended badly (`ok: false` in its summary)".to_owned());
+        }
+        let named = |flaw| format!("`{}`: {flaw}", path.display());
         let sent = |at_ns| Some(tracks.sent.newest(at_ns)?.1);
         Ok(Self {
             run: path.to_owned(),
@@ -126,9 +141,32 @@ impl Episode {
             action: joints(grid.instants().map(sent)),
             keypoints,
             pictures,
-            missing: gaps.into_iter().filter_map(told).collect(),
+            repeats,
+            missing: flaws.into_iter().map(named).collect(),
         })
     }
+}
+
+/// Long times without a picture, a joint report or a control cycle, in words.
+fn gaps(recorded: &RecordedRun, tracks: &Tracks<'_>, grid: Grid) -> Vec<String> {
+    // Where a part of the recording is lost, its cycles are, those not sent included.
+    let cycles = recorded.cycles.cycles.iter();
+    let cycles = Samples::new(cycles.map(|cycle| (cycle.deadline_ns, ())));
+    let gaps = [
+        ("pictures", grid.gaps_s(&tracks.seen)),
+        ("measured joints", grid.gaps_s(&tracks.measured)),
+        ("control cycles", grid.gaps_s(&cycles)),
+    ];
+    let there = gaps.into_iter().filter(|(_, gaps_s)| !gaps_s.is_empty());
+    let in_words = |(what, gaps_s): (&str, Vec<f64>)| {
+        let (count, total_s) = (gaps_s.len(), gaps_s.iter().sum::<f64>());
+        let longest_s = gaps_s.into_iter().fold(0.0, f64::max);
+        format!(
+            "gaps over 0.25 s without {what}: {count}, {total_s:.1} s in all, the longest \
+             {longest_s:.1} s"
+        )
+    };
+    there.map(in_words).collect()
 }
 
 fn tracks<'a>(recorded: &RecordedRun, seen: Vec<(u64, &'a [u8])>) -> Tracks<'a> {
@@ -155,15 +193,12 @@ fn joints(frames: impl Iterator<Item = Option<JointVector>>) -> Vec<f32> {
 /// How many keypoints a frame has, and those of the camera's frames at these instants, as far as
 /// the rope was tracked; none where it was tracked in none of them.
 fn keypoints(
-    recorded: &RecordedRun,
+    track: &KeypointTrack,
+    epoch_ns: u64,
     looked_ns: &[u64],
     within_ns: u64,
-) -> Result<(usize, Vec<f32>)> {
-    let none = (0, Vec::new());
-    let Some(track) = recorded.run.keypoints()? else {
-        return Ok(none);
-    };
-    let epoch = MonotonicNs(recorded.epoch_ns);
+) -> (usize, Vec<f32>) {
+    let epoch = MonotonicNs(epoch_ns);
     let tracked = track.frames.iter().filter(|frame| !frame.lost);
     let tracked = Samples::new(tracked.map(|frame| (epoch.plus_s(frame.t_s).0, &frame.points)));
     let found = looked_ns.iter();
@@ -171,12 +206,12 @@ fn keypoints(
         .map(|at_ns| tracked.nearest(*at_ns, within_ns))
         .collect();
     if found.iter().all(Option::is_none) {
-        return Ok(none);
+        return (0, Vec::new());
     }
     let unknown = vec![[f64::NAN; 2]; track.keypoints];
     let points = found.iter().flat_map(|points| points.unwrap_or(&unknown));
     let points = points.flatten().map(|px| *px as f32).collect();
-    Ok((track.keypoints, points))
+    (track.keypoints, points)
 }
 
 /// What a run is for, in words; a learner tells episodes apart by them.
@@ -196,7 +231,7 @@ fn in_words(run: &Run) -> Result<String> {
     let at = format!("at ({x:.3}, {y:.3}, {z:.3}) m");
     Ok(match earlier.task.unwrap_or_default() {
         Task::Strike => format!("strike the target {at} with the tip of the rope"),
-        Task::Lob => format!("fell the domino {at} with the tip of the rope"),
+        Task::Lob => format!("knock over the domino {at} with the tip of the rope"),
         Task::Drape => format!("hang the rope over the wall {at}"),
     })
 }

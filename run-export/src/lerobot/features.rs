@@ -22,16 +22,16 @@ pub(super) struct Place {
 pub(super) struct Feature {
     /// As `info.json` describes it: type, shape and names.
     pub(super) described: Value,
-    /// Its values.
+    /// Its values of all frames, a row each.
     pub(super) column: Column,
-    /// Its statistics.
-    pub(super) gathered: Gathered,
+    /// The same values without their order, each element apart.
+    pub(super) gathered: FeatureValues,
 }
 
 /// What the statistics of a feature are made of.
 #[derive(Debug, Clone)]
-pub(super) struct Gathered {
-    /// Name of the feature.
+pub(super) struct FeatureValues {
+    /// The feature's, as `info.json` has it.
     pub(super) name: String,
     /// Shape of each statistic; the library spreads it over the feature's own.
     pub(super) shape: Vec<usize>,
@@ -47,7 +47,7 @@ impl Feature {
         let count = names.len();
         Self {
             described: json!({ "dtype": "float32", "shape": [count], "names": names }),
-            gathered: Gathered::of(name, &[count], numbers, count),
+            gathered: FeatureValues::of(name, &[count], numbers, count),
             column: Column::lists(name, &[count], Values::Singles(numbers.to_vec())),
         }
     }
@@ -59,7 +59,7 @@ impl Feature {
         let values = numbers.iter().map(|number| *number as f64);
         Self {
             described: json!({ "dtype": "int64", "shape": [1], "names": null }),
-            gathered: Gathered {
+            gathered: FeatureValues {
                 name: name.to_owned(),
                 shape: vec![1],
                 values: vec![Distribution::of(values)],
@@ -76,7 +76,7 @@ impl Feature {
         let times: Vec<f32> = times.collect();
         Self {
             described: json!({ "dtype": "float32", "shape": [1], "names": null }),
-            gathered: Gathered::of(name, &[1], &times, 1),
+            gathered: FeatureValues::of(name, &[1], &times, 1),
             column: Column::single(name, Values::Singles(times)),
         }
     }
@@ -86,13 +86,13 @@ impl Feature {
         let (name, shape) = ("observation.keypoints", [count, 2]);
         Self {
             described: json!({ "dtype": "float32", "shape": shape, "names": ["keypoint", "u_v"] }),
-            gathered: Gathered::of(name, &[2], numbers, 2 * count),
+            gathered: FeatureValues::of(name, &[2], numbers, 2 * count),
             column: Column::lists(name, &shape, Values::Singles(numbers.to_vec())),
         }
     }
 }
 
-impl Gathered {
+impl FeatureValues {
     /// Of numbers, so many a frame. A frame without its first number has none.
     fn of(name: &str, shape: &[usize], numbers: &[f32], a_frame: usize) -> Self {
         let elements: usize = shape.iter().product();
@@ -153,7 +153,7 @@ fn image(episode: &Episode) -> Option<Feature> {
         described: json!({
             "dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"],
         }),
-        gathered: Gathered {
+        gathered: FeatureValues {
             name: name.to_owned(),
             shape: vec![3, 1, 1],
             values: pictures.colours(),

@@ -84,10 +84,12 @@ impl Grid {
         500_000_000 / u64::from(self.fps)
     }
 
-    /// The longest time without a sample, where it is worth telling (s).
-    pub(super) fn gap_s<T: Copy>(self, samples: &Samples<T>) -> Option<f64> {
-        let gap_ns = samples.longest_ns(self.begin_ns, self.at_ns(self.frames as u64));
-        (gap_ns > GAP_NS).then(|| MonotonicNs(gap_ns).since_s(MonotonicNs(0)))
+    /// The times without a sample that are worth telling (s).
+    pub(super) fn gaps_s<T: Copy>(self, samples: &Samples<T>) -> Vec<f64> {
+        let steps = samples.steps(self.begin_ns, self.at_ns(self.frames as u64));
+        let gaps = steps.filter(|gap_ns| *gap_ns > GAP_NS);
+        gaps.map(|gap_ns| MonotonicNs(gap_ns).since_s(MonotonicNs(0)))
+            .collect()
     }
 }
 
@@ -159,13 +161,13 @@ mod tests {
     }
 
     #[test]
-    fn a_long_gap_is_told() {
+    fn every_long_gap_is_told() {
         let grid = Grid::of(&tracks(every(1_000, 4_000, 50, &[][..])), None).unwrap();
         let times = [1_000, 2_000, 2_400, 9_000].map(|ms| (ms * MS, ()));
         assert_eq!(
-            grid.gap_s(&Samples::new(times[..3].iter().copied())),
-            Some(1.0)
+            grid.gaps_s(&Samples::new(times.into_iter())),
+            [1.0, 0.4, 6.6]
         );
-        assert_eq!(grid.gap_s(&every(0, 9_000, 250, ())), None);
+        assert!(grid.gaps_s(&every(0, 9_000, 250, ())).is_empty());
     }
 }

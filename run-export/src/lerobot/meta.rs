@@ -2,7 +2,7 @@
 
 use super::columns::{Column, Values};
 use super::episode::Kind;
-use super::features::{Feature, Gathered};
+use super::features::{Feature, FeatureValues};
 use super::statistics::NAMES;
 use anyhow::{Context, Result};
 use serde_json::{Map, Value, json};
@@ -30,7 +30,7 @@ impl Statistics {
     ///
     /// # Errors
     /// There is nothing to compute them of.
-    pub(super) fn of(gathered: &Gathered) -> Result<Self> {
+    pub(super) fn of(gathered: &FeatureValues) -> Result<Self> {
         let elements = gathered.values.iter().map(|values| values.statistics());
         let elements: Option<Vec<_>> = elements.collect();
         Ok(Self {
@@ -70,7 +70,7 @@ fn nested(numbers: &[f64], shape: &[usize]) -> Value {
 
 /// An episode, as the set tells of it.
 #[derive(Debug)]
-pub(super) struct Told {
+pub(super) struct EpisodeMeta {
     /// Number of its task.
     pub(super) task: usize,
     /// Number of its data file.
@@ -175,9 +175,9 @@ pub(super) fn hugging_face(features: &[Feature]) -> String {
 
 /// `episodes`: where each lies, and its statistics, of which the library makes those of joined or
 /// divided sets.
-pub(super) fn episodes(told: &[Told], tasks: &[String]) -> Vec<Column> {
-    let each = |number: &dyn Fn(&Told) -> usize| integers(told.iter().map(number));
-    let task = |told: &Told| tasks[told.task].clone();
+pub(super) fn episodes(told: &[EpisodeMeta], tasks: &[String]) -> Vec<Column> {
+    let each = |number: &dyn Fn(&EpisodeMeta) -> usize| integers(told.iter().map(number));
+    let task = |told: &EpisodeMeta| tasks[told.task].clone();
     let mut columns = vec![
         Column::single("episode_index", integers(0..told.len())),
         Column::lists(
@@ -196,7 +196,7 @@ pub(super) fn episodes(told: &[Told], tasks: &[String]) -> Vec<Column> {
     ];
     let first = told.first().map(|told| &told.statistics);
     for (feature, Statistics { name, shape, .. }) in first.into_iter().flatten().enumerate() {
-        let of = |told: &Told, number| told.statistics[feature].named(number);
+        let of = |told: &EpisodeMeta, number| told.statistics[feature].named(number);
         for (number, statistic) in NAMES.into_iter().enumerate() {
             let values = told.iter().flat_map(|told| of(told, number)).collect();
             let name = format!("stats/{name}/{statistic}");

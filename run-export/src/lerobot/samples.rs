@@ -45,12 +45,8 @@ impl<T: Copy> Samples<T> {
         steps.get(steps.len() / 2).copied()
     }
 
-    /// The longest time from one to the next between two instants (ns).
-    pub(super) fn longest_ns(&self, from_ns: u64, to_ns: u64) -> u64 {
-        self.steps(from_ns, to_ns).max().unwrap_or_default()
-    }
-
-    fn steps(&self, from_ns: u64, to_ns: u64) -> impl Iterator<Item = u64> {
+    /// The times from one to the next between two instants (ns).
+    pub(super) fn steps(&self, from_ns: u64, to_ns: u64) -> impl Iterator<Item = u64> {
         let within = move |pair: &&[(u64, T)]| pair[1].0 > from_ns && pair[0].0 < to_ns;
         let pairs = self.0.windows(2).filter(within);
         pairs.map(|pair| pair[1].0 - pair[0].0)
@@ -58,7 +54,7 @@ impl<T: Copy> Samples<T> {
 }
 
 impl Samples<JointVector> {
-    /// Between two samples in proportion; the first and the last one hold beyond.
+    /// Linearly interpolated between two samples; the first and the last one hold beyond.
     pub(super) fn between(&self, at_ns: u64) -> Option<JointVector> {
         let after = self.0.partition_point(|(t, _)| *t <= at_ns);
         let (from, to) = (self.0.get(after.saturating_sub(1))?, self.0.get(after));
@@ -87,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn joints_are_taken_in_proportion_and_hold_at_the_ends() {
+    fn joints_are_interpolated_and_hold_at_the_ends() {
         let at = |q| JointVector::splat(q);
         let samples = Samples::new([(100, at(1.0)), (200, at(3.0))].into_iter());
         let found = [0, 100, 125, 200, 300].map(|t| samples.between(t).unwrap()[6]);
@@ -100,7 +96,7 @@ mod tests {
         let samples = Samples::new(late.into_iter());
         assert_eq!(samples.period_ns(), Some(33));
         let longest = [(0, 500), (0, 90), (420, 500), (200, 300)];
-        let longest = longest.map(|(from, to)| samples.longest_ns(from, to));
+        let longest = longest.map(|(from, to)| samples.steps(from, to).max().unwrap());
         assert_eq!(longest, [300, 33, 33, 300]);
         assert_eq!(Samples::new([(1, ())].into_iter()).period_ns(), None);
     }

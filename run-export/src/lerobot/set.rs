@@ -3,31 +3,54 @@
 use super::columns::{Column, Table};
 use super::data::DataFiles;
 use super::episode::{Episode, Kind};
-use super::features::{Gathered, Place, features};
-use super::meta::{self, Statistics, Told};
+use super::features::{FeatureValues, Place, features};
+use super::meta::{self, EpisodeMeta, Statistics};
 use crate::written::{Written, WrittenFile};
 use anyhow::{Context, Result, ensure};
 use run_log::files;
 use serde_json::{Value, json};
-use std::fs::{self, DirEntry};
+use std::collections::BTreeMap;
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// File of a set by which an export knows an earlier one; the library leaves it alone.
 const MARK: &str = "meta/wag.json";
-/// What a set's folder holds.
-const FOLDERS: [&str; 2] = ["data", "meta"];
-
-/// Whether a folder holds a set that was exported, and nothing beside it.
+/// Whether a folder holds a set as it was exported: the files that were written, of the sizes
+/// that they had, and nothing beside them. Others may have added episodes, which must not be lost.
 pub(super) fn is_set(folder: &Path) -> bool {
-    let is_own = |entry: io::Result<DirEntry>| {
-        let name = entry.map(|entry| entry.file_name());
-        name.is_ok_and(|name| FOLDERS.iter().any(|own| name == *own))
-    };
     let is_folder = folder.symlink_metadata().is_ok_and(|found| found.is_dir());
-    is_folder
-        && folder.join(MARK).is_file()
-        && fs::read_dir(folder).is_ok_and(|mut entries| entries.all(is_own))
+    let as_written = || {
+        let mut found = sizes(folder).ok()?;
+        found.remove(MARK)?;
+        let mark: Value = serde_json::from_slice(&fs::read(folder.join(MARK)).ok()?).ok()?;
+        Some(mark["files"] == json!(found))
+    };
+    is_folder && as_written().unwrap_or(false)
+}
+
+/// Size of every file below a folder (bytes), by its path from there on.
+///
+/// # Errors
+/// It cannot be read, or there is something else than files and folders, which no export has.
+fn sizes(folder: &Path) -> io::Result<BTreeMap<String, u64>> {
+    let mut sizes = BTreeMap::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        // That of a link itself, which is not followed.
+        let kind = entry.file_type()?;
+        let name = entry.file_name();
+        let name = name.to_str().ok_or(io::ErrorKind::InvalidData)?;
+        if kind.is_dir() {
+            let below = self::sizes(&entry.path())?.into_iter();
+            sizes.extend(below.map(|(path, bytes)| (format!("{name}/{path}"), bytes)));
+        } else if kind.is_file() {
+            sizes.insert(name.to_owned(), entry.metadata()?.len());
+        } else {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+    }
+    Ok(sizes)
 }
 
 /// A set that is built in a folder.
@@ -40,11 +63,13 @@ pub(super) struct Set {
     /// The features, as `info.json` has them.
     described: Value,
     /// What the statistics of the whole set are made of.
-    gathered: Vec<Gathered>,
-    episodes: Vec<Told>,
+    gathered: Vec<FeatureValues>,
+    episodes: Vec<EpisodeMeta>,
     /// What is done in the episodes, each once.
     tasks: Vec<String>,
     data: DataFiles,
+    /// Frames that show the same picture as the frame before.
+    repeats: usize,
     missing: Vec<String>,
 }
 
@@ -60,6 +85,7 @@ impl Set {
             gathered: Vec::new(),
             episodes: Vec::new(),
             tasks: Vec::new(),
+            repeats: 0,
             missing: Vec::new(),
         }
     }
@@ -110,7 +136,7 @@ impl Set {
         let texts = [("huggingface", meta::hugging_face(&features))];
         let columns: Vec<Column> = features.into_iter().map(|f| f.column).collect();
         let size = [episode.frames, episode.bytes()];
-        self.episodes.push(Told {
+        self.episodes.push(EpisodeMeta {
             task,
             file: self.data.add(&columns, &texts, size)?,
             first_frame: place.first_frame,
@@ -118,6 +144,7 @@ impl Set {
             statistics,
         });
         self.runs.push(episode.run.clone());
+        self.repeats += episode.repeats;
         self.missing.extend_from_slice(&episode.missing);
         Ok(())
     }
@@ -144,22 +171,20 @@ impl Set {
         files::write_json(&at("meta/stats.json"), &meta::stats(&statistics))?;
         let info = meta::info(kind, &self.described, totals);
         files::write_json(&at("meta/info.json"), &info)?;
-        let named = |run: &PathBuf| {
-            run.file_name()
-                .map(|name| name.to_string_lossy().into_owned())
-        };
-        let runs: Vec<_> = self.runs.iter().map(named).collect();
-        let mark = json!({ "version": shared_types::VERSION, "runs": runs });
+        let data = self.data.finish()?.into_iter();
+        // All other files are complete now.
+        let runs: Vec<_> = self.runs.iter().map(|run| run.to_string_lossy()).collect();
+        let sizes = sizes(&self.folder)?;
+        let mark = json!({ "version": shared_types::VERSION, "runs": runs, "files": sizes });
         files::write_json(&at(MARK), &mark)?;
 
-        let data = self.data.finish()?.into_iter();
         let data = data.map(|file| WrittenFile {
             path: out.join(file.path),
             ..file
         });
         let figures = json!({
             "runs": self.runs, "folder": out, "fps": kind.fps, "episodes": totals[0],
-            "frames": totals[1], "tasks": self.tasks,
+            "frames": totals[1], "repeated_pictures": self.repeats, "tasks": self.tasks,
         });
         Ok(Written {
             run: self.runs.into_iter().next().unwrap_or_default(),

@@ -12,7 +12,7 @@ const QUANTILES: [f64; 5] = [0.01, 0.10, 0.50, 0.90, 0.99];
 pub(super) struct Distribution(Vec<(f64, u64)>);
 
 impl Distribution {
-    /// Of numbers, each once; one that is no number stands for a missing one and is left out.
+    /// Of numbers, each once; NaN stands for a missing one and is left out.
     pub(super) fn of(values: impl Iterator<Item = f64>) -> Self {
         let known = values.filter(|value| !value.is_nan());
         Self(known.map(|value| (value, 1)).collect())
@@ -30,8 +30,8 @@ impl Distribution {
         self.0.extend_from_slice(&more.0);
     }
 
-    /// Least, greatest, mean, standard deviation of the population, and quantiles, between two
-    /// values in proportion; `None` of no values.
+    /// Least, greatest, mean, standard deviation of the population, and quantiles, linearly
+    /// interpolated between values; `None` of no values.
     pub(super) fn statistics(&self) -> Option<[f64; NAMES.len()]> {
         let mut rising = self.0.clone();
         rising.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_between_two_values_are_in_proportion() {
+    fn quantiles_between_two_values_are_interpolated() {
         let found = Distribution::of([4.0, 2.0].into_iter())
             .statistics()
             .unwrap();

@@ -15,7 +15,7 @@ STATISTICS = ["min", "max", "mean", "std", "q01", "q10", "q50", "q90", "q99"]
 
 
 def same(what, found, expected, tolerance=0.0):
-    """Compares numbers, texts and lists of them; None stands for no number."""
+    """Compares numbers, texts and lists of them; None stands for NaN."""
     if isinstance(expected, (list, tuple)):
         assert len(found) == len(expected), f"{what}: {len(found)} instead of {len(expected)}"
         for i, pair in enumerate(zip(found, expected)):

@@ -8,7 +8,7 @@ mod recorded;
 
 use recorded::Recorded;
 use run_export::lerobot;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -52,6 +52,14 @@ fn another_reader_finds_the_runs_values_and_their_statistics() {
     let runs = [first.folder.clone(), second.folder.clone()];
     let written = lerobot(&runs, &out, None).unwrap();
     assert_eq!(written.figures["episodes"], 2);
+    // The picture that the recorder left out is missing in both.
+    assert_eq!(written.figures["repeated_pictures"], 2);
+    for (run, missing) in runs.iter().zip(&written.missing) {
+        let said = format!("`{}`: 1 of ", run.display());
+        assert!(missing.starts_with(&said), "{missing}");
+        assert!(missing.ends_with("repeat the picture before"), "{missing}");
+    }
+    assert_eq!(written.missing.len(), 2, "{:?}", written.missing);
     assert_eq!(
         written.files[0].count,
         written.figures["frames"].as_u64().unwrap()
@@ -157,7 +165,61 @@ fn runs_that_differ_are_refused_by_name_and_nothing_is_left() {
     let said = refused(&[&first], &first.folder, None);
     assert!(said.contains("no earlier export"), "{said}");
     // Nor is a set that somebody has put something into.
-    fs::write(at("set/notes.txt"), "mine").unwrap();
+    let data = at("set/data/chunk-000/file-000.parquet");
+    let others = ["notes.txt", "data/chunk-000/file-001.parquet"].map(|name| at("set").join(name));
+    for other in &others {
+        fs::write(other, "mine").unwrap();
+        let said = refused(&[&first], &at("set"), None);
+        assert!(said.contains("no earlier export"), "{said}");
+        fs::remove_file(other).unwrap();
+    }
+    std::os::unix::fs::symlink(&data, &others[1]).unwrap();
     let said = refused(&[&first], &at("set"), None);
     assert!(said.contains("no earlier export"), "{said}");
+    fs::remove_file(&others[1]).unwrap();
+    // As it was, it is replaced; with a file of another size, it is not.
+    lerobot(&runs, &at("set"), Some(15)).unwrap();
+    let longer = [fs::read(&data).unwrap(), b"mine".to_vec()].concat();
+    fs::write(&data, longer).unwrap();
+    let said = refused(&[&first], &at("set"), None);
+    assert!(said.contains("no earlier export"), "{said}");
+}
+
+#[test]
+fn what_is_wrong_with_a_run_is_told_with_its_name() {
+    let place = tempfile::tempdir().unwrap();
+    let at = |name: &str| place.path().join(name);
+    let (good, bad) = (
+        Recorded::new(at("good")),
+        Recorded {
+            lost_cycles: 100..200,
+            is_ok: false,
+            ..Recorded::new(at("bad"))
+        },
+    );
+    [&good, &bad].into_iter().for_each(Recorded::write);
+    // Times of the tracker's frames that are of none of the camera's.
+    for run in [&good, &bad] {
+        let path = run.folder.join("keypoints.json");
+        let mut track: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        for frame in track["frames"].as_array_mut().unwrap() {
+            frame["t_s"] = json!(frame["t_s"].as_f64().unwrap() + 1000.0);
+        }
+        fs::write(&path, track.to_string()).unwrap();
+    }
+    let runs = [good.folder.clone(), bad.folder.clone()];
+    let missing = lerobot(&runs, &at("set"), None).unwrap().missing;
+    let of = |run: &Recorded| {
+        let name = format!("`{}`: ", run.folder.display());
+        let own = missing.iter().filter_map(|said| said.strip_prefix(&name));
+        own.collect::<Vec<_>>().join("\n")
+    };
+    let [of_good, of_bad] = [&good, &bad].map(of);
+    // From cycle 99 to cycle 200, 4 ms each.
+    let gap = "gaps over 0.25 s without control cycles: 1, 0.4 s in all, the longest 0.4 s";
+    assert!(of_bad.contains(gap), "{of_bad}");
+    assert!(of_bad.contains("`ok: false`"), "{of_bad}");
+    assert!(of_bad.contains("no keypoints"), "{of_bad}");
+    assert!(of_good.contains("no keypoints"), "{of_good}");
+    assert_eq!(of_good.lines().count(), 2, "{of_good}");
 }

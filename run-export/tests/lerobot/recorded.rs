@@ -7,7 +7,7 @@ use shared_types::ipc::{FrameHeader, JointReport, PIXEL_FORMAT_YUYV};
 use shared_types::keypoints::TrackedFrame;
 use shared_types::{KeypointTrack, MonotonicNs};
 use std::fs;
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
 /// When the controller began (CLOCK_MONOTONIC, ns), and how far the wall clock was ahead (ns).
@@ -37,6 +37,10 @@ pub(crate) struct Recorded {
     pub(crate) size_px: [u32; 2],
     /// Where the target hung (m).
     pub(crate) target_m: [f64; 3],
+    /// Control cycles that are not in the recording, with the reports that came in them.
+    pub(crate) lost_cycles: Range<u64>,
+    /// Whether it ended well.
+    pub(crate) is_ok: bool,
 }
 
 impl Recorded {
@@ -48,15 +52,21 @@ impl Recorded {
             pictures: 60,
             size_px: [16, 8],
             target_m: [0.6, -0.0001, 0.4],
+            lost_cycles: 0..0,
+            is_ok: true,
         }
     }
 
     /// Writes it.
     pub(crate) fn write(&self) {
         fs::create_dir(&self.folder).unwrap();
-        fs::write(self.folder.join(files::CYCLES), recording()).unwrap();
+        fs::write(
+            self.folder.join(files::CYCLES),
+            recording(&self.lost_cycles),
+        )
+        .unwrap();
         let summary = json!({
-            "ok": true, "command": "run", "task": "strike", "target_m": self.target_m,
+            "ok": self.is_ok, "command": "run", "task": "strike", "target_m": self.target_m,
             "epoch_ns": self.stamp_ns(*TRACKED.start()),
         });
         files::write_json(&self.folder.join(files::SUMMARY), &summary).unwrap();
@@ -206,7 +216,7 @@ fn measured_rad(at_ns: u64, joint: usize) -> f64 {
 }
 
 /// The control cycles and joint reports of a run.
-fn recording() -> Vec<u8> {
+fn recording(lost_cycles: &Range<u64>) -> Vec<u8> {
     let (mut writer, mut bytes) = (ChunkWriter::default(), Vec::new());
     let mut reports = (0..=LAST_REPORT).peekable();
     for cycle in 0..=CYCLES[1] {
@@ -224,6 +234,9 @@ fn recording() -> Vec<u8> {
             };
             told.q.0 = std::array::from_fn(|joint| measured_rad(report_ns(report), joint));
             one.input.reports.push(told);
+        }
+        if lost_cycles.contains(&cycle) {
+            continue;
         }
         bytes.extend(writer.cycle(&one).unwrap_or_default());
     }
