@@ -113,7 +113,8 @@ impl Episode {
 
         let repeats = shown.windows(2).filter(|pair| pair[0].0 == pair[1].0);
         let repeats = repeats.count();
-        let mut flaws = gaps(recorded, &tracks, grid);
+        let mut flaws = recorded.flaws.clone();
+        flaws.extend(gaps(recorded, &tracks, grid));
         if repeats > 0 {
             let frames = grid.frames;
             flaws.push(format!(
@@ -124,7 +125,7 @@ impl Episode {
             flaws.push("no keypoints, as none of those tracked are of its frames".to_owned());
         }
         if run.summary()?.unwrap_or_default()["ok"] == false {
-            flaws.push("it ended badly (`ok: false` in its summary)".to_owned());
+            flaws.push("it failed (`ok` is false in its summary)".to_owned());
         }
         let named = |flaw| format!("`{}`: {flaw}", path.display());
         let sent = |at_ns| Some(tracks.sent.newest(at_ns)?.1);
