@@ -8,6 +8,7 @@
 mod channel;
 mod clock;
 mod counts;
+mod feed;
 mod film;
 mod image;
 mod messages;
@@ -23,6 +24,7 @@ mod writer;
 
 pub use channel::Channel;
 pub use counts::RecordingCounts;
+pub use feed::{Feed, Sink};
 pub(crate) use film::GAP_NS;
 pub use film::{RunFilm, RunPart};
 pub use image::left_jpeg;

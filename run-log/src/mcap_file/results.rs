@@ -3,6 +3,7 @@
 
 use super::channel::Channel;
 use super::clock::Clock;
+use super::feed::Sink;
 use super::messages::time;
 use super::scene::rope;
 use super::writer::McapFile;
@@ -54,10 +55,10 @@ impl Results {
     }
 
     /// Takes in what has appeared.
-    pub(super) fn look(&mut self, file: &mut McapFile, clock: Clock) -> Result<()> {
+    pub(super) fn look(&mut self, sink: &mut impl Sink, clock: Clock) -> Result<()> {
         for ((name, channel, field), taken) in FILES.into_iter().zip(&mut self.taken) {
             let path = self.run.join(name);
-            if *taken || !path.is_file() {
+            if *taken || !sink.wants(channel) || !path.is_file() {
                 continue;
             }
             *taken = true;
@@ -65,9 +66,9 @@ impl Results {
                 Ok(value) => {
                     let at_ns = clock.now_ns();
                     let message = json!({ "timestamp": time(at_ns), field: value });
-                    file.json(channel, at_ns, &message)?;
+                    sink.message(channel, at_ns, &message)?;
                 }
-                Err(reason) => tracing::warn!("not in the recording: {reason:#}"),
+                Err(reason) => tracing::warn!("a result is left out: {reason:#}"),
             }
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! An MCAP file that grows by whole chunks.
 
 use super::channel::Channel;
+use super::feed::Sink;
 use super::schema::Schemas;
 use crate::files::cannot_write;
 use anyhow::{Context, Result};
@@ -40,6 +41,16 @@ pub(super) fn options() -> WriteOptions {
         .chunk_size(Some(CHUNK_BYTES))
         // A chunk goes into the file in one piece when it is closed, not bit by bit.
         .disable_seeking(true)
+}
+
+impl Sink for McapFile {
+    fn message(&mut self, channel: Channel, at_ns: u64, message: &Value) -> Result<()> {
+        self.json(channel, at_ns, message)
+    }
+
+    fn chunk(&mut self, at_ns: u64, bytes: &[u8]) -> Result<()> {
+        self.bytes(Channel::Replay, at_ns, bytes)
+    }
 }
 
 impl McapFile {
