@@ -1,5 +1,8 @@
 //! The channels of a file: topic and schema.
 
+use super::schema::Schemas;
+use anyhow::Result;
+
 /// One channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Channel {
@@ -76,6 +79,22 @@ impl Channel {
     /// Topic.
     pub const fn topic(self) -> &'static str {
         Self::ALL[self as usize].1
+    }
+
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().map(|(channel, ..)| channel)
+    }
+
+    /// Name and JSON schema of its messages; none for bytes that only this program reads.
+    ///
+    /// # Errors
+    /// The schemas cannot be read, which is a flaw of this program.
+    pub fn schema(self) -> Result<Option<(&'static str, String)>> {
+        let Some(name) = Self::ALL[self as usize].2 else {
+            return Ok(None);
+        };
+        Ok(Some((name, Schemas::read()?.schema(name).to_string())))
     }
 
     /// The channel of a topic.

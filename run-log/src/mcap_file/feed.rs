@@ -130,6 +130,11 @@ impl Feed {
         })
     }
 
+    /// Links are placed for an arm with this pole from now on.
+    pub fn set_pole(&mut self, pole: Pole) {
+        self.told.pole = pole;
+    }
+
     /// Tells what does not move: arm, pole and target, and the camera's calibration and pose.
     ///
     /// # Errors

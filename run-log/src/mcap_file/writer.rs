@@ -2,7 +2,6 @@
 
 use super::channel::Channel;
 use super::feed::Sink;
-use super::schema::Schemas;
 use crate::files::cannot_write;
 use anyhow::{Context, Result};
 use mcap::records::{MessageHeader, Metadata};
@@ -63,18 +62,16 @@ impl McapFile {
             .map_err(cannot_write(path))?;
         let fail = || format!("cannot write `{}`", path.display());
         let mut writer = options().create(file).with_context(fail)?;
-        let schemas = Schemas::read()?;
         let mut ids = Vec::new();
-        for (_, topic, schema) in Channel::ALL {
-            let (schema_id, encoding) = match schema {
-                Some(name) => {
-                    let text = schemas.schema(name).to_string();
+        for channel in Channel::all() {
+            let (schema_id, encoding) = match channel.schema()? {
+                Some((name, text)) => {
                     let id = writer.add_schema(name, "jsonschema", text.as_bytes())?;
                     (id, "json")
                 }
                 None => (0, "wag-replay-chunk"),
             };
-            ids.push(writer.add_channel(schema_id, topic, encoding, &BTreeMap::new())?);
+            ids.push(writer.add_channel(schema_id, channel.topic(), encoding, &BTreeMap::new())?);
         }
         Ok(Self {
             writer,

@@ -98,18 +98,75 @@ impl Controller {
     }
 }
 
-/// One domain. Fields are dropped in order: readers, connection, sweep.
+/// One domain, and the controller that runs there. Fields are dropped in order: readers,
+/// connection, sweep.
+#[derive(Debug)]
+pub struct Joined {
+    pub(crate) controller: Option<Controller>,
+    bus: Bus,
+    _sweep: DomainSweep,
+    pub(crate) domain: String,
+}
+
+impl Joined {
+    /// Joins a domain, whether a controller runs there yet or not.
+    ///
+    /// # Errors
+    /// The domain has no valid name, or shared memory cannot be used.
+    pub fn join(domain: &str) -> Result<Self, IpcError> {
+        let sweep = DomainSweep::new(domain);
+        Ok(Self {
+            controller: None,
+            bus: Bus::join(domain)?,
+            _sweep: sweep,
+            domain: domain.to_owned(),
+        })
+    }
+
+    /// The connection.
+    pub fn bus(&self) -> &Bus {
+        &self.bus
+    }
+
+    /// Whether a controller runs there. One that has ended is let go; one that is new is found
+    /// when `search` says to look, and so is what its folder tells: the one named, or else its
+    /// own.
+    pub fn has_controller(&mut self, search: bool, run: Option<&Path>) -> bool {
+        let there = self.look(search, run).is_some();
+        if let Some(controller) = self.controller.as_mut().filter(|_| search) {
+            controller.facts.look();
+        }
+        there
+    }
+
+    /// What the folder of the controller's run tells.
+    pub fn facts(&self) -> Option<&Facts> {
+        self.controller.as_ref().map(|controller| &controller.facts)
+    }
+
+    fn look(&mut self, search: bool, run: Option<&Path>) -> Option<Seen> {
+        if self.controller.is_none() && search {
+            self.controller = Controller::open(&self.bus, run).ok();
+        }
+        let seen = self.controller.as_mut()?.look();
+        let gone = !seen.alive && !Path::new(&format!("/proc/{}", seen.state.pid)).exists();
+        if gone {
+            self.controller = None;
+            return None;
+        }
+        Some(seen)
+    }
+}
+
+/// One domain with what the page shows of it. Fields are dropped in order: readers, connection.
 #[derive(Debug)]
 pub(crate) struct Attached {
-    pub controller: Option<Controller>,
     /// Its cycles; `None` where too many listen already.
     pub cycles: Option<CycleSubscriber>,
     /// Joints as measured.
     pub joints: Option<JointSubscriber>,
     pub film: Option<Film>,
-    bus: Bus,
-    _sweep: DomainSweep,
-    pub domain: String,
+    pub joined: Joined,
 }
 
 /// One that cannot be opened is warned of and done without.
@@ -121,41 +178,30 @@ fn opened_or_warned<T, E: Into<anyhow::Error>>(what: &str, opened: Result<T, E>)
 impl Attached {
     /// Joins a domain, whether a controller runs there yet or not.
     pub(crate) fn join(domain: &str) -> Result<Self, IpcError> {
-        let sweep = DomainSweep::new(domain);
-        let bus = Bus::join(domain)?;
+        let joined = Joined::join(domain)?;
+        let bus = joined.bus();
         Ok(Self {
-            controller: None,
             cycles: opened_or_warned("jitter", bus.cycle_subscriber()),
             joints: opened_or_warned("the rope", bus.joint_subscriber()),
-            film: opened_or_warned("the camera", Film::open(&bus)),
-            bus,
-            _sweep: sweep,
-            domain: domain.to_owned(),
+            film: opened_or_warned("the camera", Film::open(bus)),
+            joined,
         })
     }
 
     /// What the controller shows. One that has ended is let go; one that is new is
     /// found when `search` says to look.
     pub(crate) fn look(&mut self, search: bool, run: Option<&Path>) -> Option<Seen> {
-        if self.controller.is_none() && search {
-            self.controller = Controller::open(&self.bus, run).ok();
-        }
-        let controller = self.controller.as_mut()?;
+        let seen = self.joined.look(search, run)?;
+        let controller = self.joined.controller.as_mut()?;
         if controller.requests.is_none() && search {
-            controller.requests = RpcClient::open(&self.bus).ok();
-        }
-        let seen = controller.look();
-        let gone = !seen.alive && !Path::new(&format!("/proc/{}", seen.state.pid)).exists();
-        if gone {
-            self.controller = None;
-            return None;
+            controller.requests = RpcClient::open(&self.joined.bus).ok();
         }
         Some(seen)
     }
 }
 
 /// The domain whose controller started last.
-pub(crate) fn newest_domain() -> Option<String> {
+pub fn newest_domain() -> Option<String> {
     running_controllers()
         .into_iter()
         .filter_map(|domain| {
@@ -214,7 +260,7 @@ mod tests {
         state.pid = u32::MAX;
         boards.publish(state);
         assert!(attached.look(false, None).is_none());
-        assert!(attached.controller.is_none());
+        assert!(attached.joined.controller.is_none());
     }
 
     #[test]

@@ -26,7 +26,8 @@ pub fn domain_of_run(run: &Path) -> anyhow::Result<String> {
 
 /// Facts of one run folder, read again when a file changes.
 #[derive(Debug, Default)]
-pub(crate) struct Facts {
+pub struct Facts {
+    /// The folder, where there is one.
     pub folder: Option<PathBuf>,
     stamps: [Option<SystemTime>; 4],
     identified: Option<RopeParams>,
@@ -91,7 +92,7 @@ impl Facts {
     }
 
     /// Where the throw is to go (m).
-    pub(crate) fn target_m(&self) -> Option<[f64; 3]> {
+    pub fn target_m(&self) -> Option<[f64; 3]> {
         self.plan.as_ref().map(|plan| plan.target_m)
     }
 }

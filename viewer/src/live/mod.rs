@@ -20,14 +20,15 @@ mod snapshot;
 mod stage;
 mod token;
 
+pub use attached::{Joined, newest_domain};
 pub use desk::{Asked, Desk};
-pub use facts::domain_of_run;
+pub use facts::{Facts, domain_of_run};
 pub use http::Reply;
 pub use page::{IDS, script, style};
 
 use crate::report::{REPORT, arm_points, headline_of, tenths_mm};
 use ask::{Ask, Open, Requested, hand_over};
-use attached::{Attached, Seen, newest_domain};
+use attached::{Attached, Seen};
 use camera_ingest::preview::PreviewConfig;
 use http::Site;
 use jitter::Jitter;
@@ -185,7 +186,7 @@ impl Watcher {
     fn pass_on(&mut self, requested: Requested) {
         tracing::info!(ask = requested.ask.name(), "requested by a page");
         let attached = self.attached.as_ref();
-        let controller = attached.and_then(|attached| attached.controller.as_ref());
+        let controller = attached.and_then(|attached| attached.joined.controller.as_ref());
         let requests = controller.and_then(|controller| controller.requests.as_ref());
         self.open
             .extend(hand_over(requested, requests, self.seen.as_ref()));
@@ -206,7 +207,9 @@ impl Watcher {
             Wanted::Newest => None,
         };
         let attached = self.attached.as_mut();
-        let had = attached.as_ref().is_some_and(|a| a.controller.is_some());
+        let had = attached
+            .as_ref()
+            .is_some_and(|a| a.joined.controller.is_some());
         let seen = attached.and_then(|a| a.look(search, run.as_deref()));
         match (had, seen) {
             // Nothing of the one before counts for it.
@@ -248,14 +251,14 @@ impl Watcher {
     /// of the run; the page tells where there is none.
     pub fn preview_view(&mut self, named: Option<&Path>) -> Option<PreviewConfig> {
         let attached = self.attached.as_mut()?;
-        let facts = attached.controller.as_ref().map(|c| &c.facts);
+        let facts = attached.joined.controller.as_ref().map(|c| &c.facts);
         let camera = named.map(Path::to_owned);
         let camera = camera.or_else(|| facts?.camera_file());
         if let Some(film) = &mut attached.film {
             film.lacks_calibration = camera.is_none();
         }
         let cell = self.here.of_run(facts.and_then(|f| f.cell));
-        Some(PreviewConfig::new(&attached.domain, camera?, cell))
+        Some(PreviewConfig::new(&attached.joined.domain, camera?, cell))
     }
 
     /// Whether a preview runs already, whoever started it.
@@ -277,10 +280,10 @@ impl Watcher {
         let Some(attached) = &mut self.attached else {
             return Ok(());
         };
-        if let Some(controller) = attached.controller.as_mut().filter(|_| search) {
+        if let Some(controller) = attached.joined.controller.as_mut().filter(|_| search) {
             controller.facts.look();
         }
-        let facts = attached.controller.as_ref().map(|c| &c.facts);
+        let facts = attached.joined.controller.as_ref().map(|c| &c.facts);
         let pole = self.here.of_run(facts.and_then(|f| f.cell)).pole;
         let known = facts.and_then(|facts| facts.rope());
         let followed = self.shown.rope.as_ref().map(|(rope, _)| rope.params);
@@ -346,13 +349,13 @@ impl Watcher {
                 ..snapshot
             };
         };
-        let facts = attached.controller.as_ref().map(|c| &c.facts);
+        let facts = attached.joined.controller.as_ref().map(|c| &c.facts);
         snapshot.cell = self.here.of_run(facts.and_then(|f| f.cell));
         self.shown.folder = facts.and_then(|facts| facts.folder.clone());
         let name = self.shown.folder.as_ref().and_then(|f| f.file_name());
         snapshot.title = match name {
-            Some(name) => format!("{} (domain {})", name.display(), attached.domain),
-            None => format!("domain {}", attached.domain),
+            Some(name) => format!("{} (domain {})", name.display(), attached.joined.domain),
+            None => format!("domain {}", attached.joined.domain),
         };
         if !seen.alive {
             "the controller is silent: use the emergency stop".clone_into(&mut snapshot.note);

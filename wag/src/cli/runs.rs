@@ -7,6 +7,7 @@ use cli_output::seed;
 use shared_types::Task;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
+use telemetry::TelemetryArgs;
 
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
@@ -47,7 +48,8 @@ pub enum RecordCommand {
     wag watch                       whichever run began last, then the next\n  \
     wag watch runs/NAME             a run that is under way\n  \
     wag watch --domain cell-1       a controller or camera that runs as a daemon\n  \
-    wag watch --preview             with the rope's keypoints as the frames come\n\n\
+    wag watch --preview             with the rope's keypoints as the frames come\n  \
+    wag watch --foxglove            for the application Foxglove, at ws://127.0.0.1:8765\n\n\
     The address it prints holds a secret: whoever knows it can look on and stop the arm.\n\
     From another machine: ssh -L PORT:127.0.0.1:PORT HOST, then the same address.")]
 pub struct WatchArgs {
@@ -69,6 +71,8 @@ pub struct WatchArgs {
     /// Calibration for the preview; default: camera.toml in the run folder.
     #[arg(long, value_name = "camera.toml", requires = "preview")]
     pub camera: Option<PathBuf>,
+    #[command(flatten)]
+    pub telemetry: TelemetryArgs,
     /// Stop after this long (s); default: on Ctrl-C.
     #[arg(long, value_parser = span_s)]
     pub seconds: Option<f64>,

@@ -35,6 +35,9 @@ pub fn run(args: &WatchArgs) -> Outcome<Option<Value>> {
     }
     let here = config::cell_here().or_input()?;
     watch_interrupts().or_failed()?;
+    if args.telemetry.is_wanted() {
+        return telemetry::run(&args.telemetry, wanted, here, args.seconds);
+    }
     let mut preview = args.preview.then(Preview::new).transpose().or_failed()?;
     let (mut watcher, url) = Watcher::start(wanted, args.bind, here, None).map_err(|error| {
         match error.downcast_ref::<IpcError>() {

@@ -1,0 +1,94 @@
+//! `wag watch --foxglove`, as it is typed and run.
+
+use crate::foxglove::Socket;
+use crate::source::Source;
+use anyhow::Result;
+use clap::Args;
+use cli_output::{OrInput, Outcome, is_interrupted, output, println};
+use run_log::{CellHere, Channel, Sink};
+use serde_json::{Value, json};
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+use viewer::live::Wanted;
+
+/// Pause between two looks at what has arrived.
+const TURN: Duration = Duration::from_millis(10);
+/// How much sooner everything else gets a processor than this program.
+const NICE: i32 = 10;
+
+/// Whom to tell.
+#[derive(Debug, Clone, Args)]
+pub struct TelemetryArgs {
+    /// Instead of the page, a socket for the application Foxglove, with the topics of run.mcap:
+    /// it can be looked at, and nothing more. Anything but loopback lets other machines look on,
+    /// without encryption. In builds with `--features foxglove` only.
+    #[arg(
+        long,
+        value_name = "ADDR:PORT",
+        num_args = 0..=1,
+        default_missing_value = "127.0.0.1:8765",
+        conflicts_with_all = ["bind", "preview", "camera"]
+    )]
+    pub foxglove: Option<SocketAddr>,
+}
+
+impl TelemetryArgs {
+    /// Whether anybody is to be told anything.
+    #[must_use]
+    pub fn is_wanted(&self) -> bool {
+        self.foxglove.is_some()
+    }
+}
+
+/// All sinks of a command.
+struct Sinks(Vec<Box<dyn Sink>>);
+
+impl Sink for Sinks {
+    fn wants(&self, channel: Channel) -> bool {
+        self.0.iter().any(|sink| sink.wants(channel))
+    }
+
+    fn message(&mut self, channel: Channel, at_ns: u64, message: &Value) -> Result<()> {
+        let mut sinks = self.0.iter_mut();
+        sinks.try_for_each(|sink| sink.message(channel, at_ns, message))
+    }
+}
+
+/// Tells the messages of the run that is wanted until Ctrl-C, or for a while.
+///
+/// # Errors
+/// The domain cannot be joined, or there is no place to serve at.
+pub fn run(
+    args: &TelemetryArgs,
+    wanted: Wanted,
+    here: CellHere,
+    seconds: Option<f64>,
+) -> Outcome<Option<Value>> {
+    let mut source = Source::new(wanted, here).or_input()?;
+    let mut sinks = Sinks(Vec::new());
+    let mut report = json!({ "ok": true, "command": "watch" });
+    if let Some(bind) = args.foxglove {
+        let socket = Socket::start(bind).or_input()?;
+        let url = socket.url();
+        println!("{url}\nOpen it in Foxglove (\"Open connection\"); Ctrl-C ends it.");
+        if !bind.ip().is_loopback() {
+            eprintln!("warning: whoever reaches {} can look on", bind.ip());
+        }
+        report["foxglove"] = url.into();
+        sinks.0.push(Box::new(socket));
+    }
+    output::object(&report);
+    // Whatever happens here may wait; what is told of may not.
+    let _ = rustix::process::nice(NICE);
+    let (began, span_s) = (Instant::now(), seconds.unwrap_or(f64::INFINITY));
+    let mut named = None;
+    while !is_interrupted() && began.elapsed().as_secs_f64() < span_s {
+        source.turn(&mut sinks).or_failed()?;
+        if let Some(run) = source.run().filter(|run| named.as_deref() != Some(*run)) {
+            eprintln!("run `{}` is told", run.display());
+            named = Some(run.to_owned());
+        }
+        std::thread::sleep(TURN);
+    }
+    Ok(None)
+}
