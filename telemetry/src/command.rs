@@ -4,7 +4,7 @@ use crate::foxglove::Socket;
 use crate::source::Source;
 use anyhow::Result;
 use clap::Args;
-use cli_output::{OrInput, Outcome, is_interrupted, output, println};
+use cli_output::{Failure, OrInput, Outcome, is_interrupted, output, println};
 use run_log::{CellHere, Channel, Sink};
 use serde_json::{Value, json};
 use std::net::SocketAddr;
@@ -68,7 +68,7 @@ pub fn run(
     let mut sinks = Sinks(Vec::new());
     let mut report = json!({ "ok": true, "command": "watch" });
     if let Some(bind) = args.foxglove {
-        let socket = Socket::start(bind).or_input()?;
+        let socket = Socket::start(bind).map_err(Failure::of_server)?;
         let url = socket.url();
         println!("{url}\nOpen it in Foxglove (\"Open connection\"); Ctrl-C ends it.");
         if !bind.ip().is_loopback() {

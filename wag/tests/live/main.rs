@@ -6,6 +6,8 @@ mod browser;
 mod chromium;
 mod client;
 mod fake;
+#[cfg(feature = "foxglove")]
+mod foxglove;
 mod preview;
 mod server;
 mod stop;
