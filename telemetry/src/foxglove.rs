@@ -21,6 +21,8 @@ mod socket {
         /// By number of the channel; none for bytes that only this program reads.
         channels: Vec<Option<Arc<RawChannel>>>,
         address: SocketAddr,
+        /// The server knows it, and through it the channels, for as long as it is here.
+        _context: Arc<Context>,
         server: Option<WebSocketServerHandle>,
     }
 
@@ -54,6 +56,7 @@ mod socket {
             Ok(Self {
                 channels,
                 address,
+                _context: context,
                 server: Some(server),
             })
         }

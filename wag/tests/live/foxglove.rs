@@ -9,14 +9,13 @@ use std::sync::atomic::Ordering;
 
 const CLIENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live/foxglove.mjs");
 /// What comes of a controller with a camera and an identified rope.
-const TOPICS: [&str; 8] = [
+const TOPICS: [&str; 7] = [
     "/arm/measured",
     "/controller/cycles",
     "/tf",
     "/scene",
     "/camera/left/image",
     "/camera/left/calibration",
-    "/log",
     "/wag/parameters",
 ];
 
@@ -44,11 +43,10 @@ fn foxglove_sees_all_topics_with_their_schemas_and_can_do_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let fake = Fake::start(&format!("foxglove-{}", std::process::id()));
     run_folder(folder.path(), &fake.domain);
-    let camera = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../configs/camera/example.toml"
-    );
-    std::fs::copy(camera, folder.path().join("camera.toml")).unwrap();
+    let camera = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/camera/example");
+    for (from, to) in [("toml", "camera.toml"), ("conf", "example.conf")] {
+        std::fs::copy(format!("{camera}.{from}"), folder.path().join(to)).unwrap();
+    }
     let run = folder.path().display();
     let (mut watch, reported) = Running::start(&format!("watch {run} --foxglove 127.0.0.1:0"));
     let url = reported["foxglove"].as_str().unwrap();
