@@ -25,6 +25,7 @@
 #![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
 
 mod clamp_motion;
+mod columns;
 mod command_line;
 mod cycle_sample;
 mod cycles;
@@ -42,6 +43,7 @@ mod tracked_film;
 mod unconfirmed;
 
 pub use clamp_motion::ClampMotion;
+pub use columns::Column;
 pub use command_line::{CommandLine, quoted};
 pub use cycle_sample::{CycleSample, Figures, RunLog, WorstJoint};
 pub use cycles::Cycles;

@@ -6,14 +6,13 @@ mod file;
 use crate::recorded::RecordedRun;
 use crate::written::{Written, WrittenFile};
 use anyhow::Result;
-use arm_model::{JOINTS, JointVector};
+use arm_model::JOINTS;
 use cli_output::{OrInput, Outcome};
 use file::NpzFile;
-use run_log::{Cycles, files};
+use run_log::{Column, files};
 use serde_json::json;
-use shared_types::ipc::{ControllerMode, CycleRecord, JointReport};
 use shared_types::rope::RANGES;
-use shared_types::{FaultCode, KeypointTrack, Plan, RopeParams};
+use shared_types::{KeypointTrack, Plan, RopeParams};
 use std::path::Path;
 
 /// Name of the file, where none is given.
@@ -46,8 +45,8 @@ pub fn npz(run: &Path, out: Option<&Path>) -> Outcome<Written> {
     let mut file = NpzFile::new();
     let put = |file: &mut NpzFile| -> Result<()> {
         file.scalar("epoch_ns", recorded.epoch_ns)?;
-        put_cycles(file, &recorded.cycles.cycles)?;
-        put_reports(file, &recorded.cycles)?;
+        put_columns(file, "cycles", recorded.cycles.cycle_columns())?;
+        put_columns(file, "reports", recorded.cycles.report_columns())?;
         keypoints.iter().try_for_each(|k| put_keypoints(file, k))?;
         plan.iter().try_for_each(|plan| put_plan(file, plan))?;
         rope.iter().try_for_each(|rope| put_rope(file, rope))
@@ -67,52 +66,24 @@ pub fn npz(run: &Path, out: Option<&Path>) -> Outcome<Written> {
     })
 }
 
-/// Joints of rows, as a table.
-fn put_joints<T>(
+/// Columns of the same rows under one name.
+fn put_columns<const N: usize>(
     file: &mut NpzFile,
-    name: &str,
-    rows: &[T],
-    of: fn(&T) -> &JointVector,
+    under: &str,
+    columns: [(&str, Column); N],
 ) -> Result<()> {
-    file.table(name, &[JOINTS], rows.iter().map(|row| &of(row).0[..]))
-}
-
-fn put_cycles(file: &mut NpzFile, cycles: &[CycleRecord]) -> Result<()> {
-    let of = |number: fn(&CycleRecord) -> u64| cycles.iter().map(number);
-    let of_32 = |number: fn(&CycleRecord) -> u32| cycles.iter().map(number);
-    let texts =
-        |text: fn(&CycleRecord) -> String| -> Vec<String> { cycles.iter().map(text).collect() };
-    file.row("cycles/cycle", of(|c| c.cycle))?;
-    file.row("cycles/deadline_ns", of(|c| c.deadline_ns))?;
-    let mode = texts(|c| format!("{:?}", ControllerMode::from_raw(c.mode)));
-    file.texts("cycles/mode", &mode)?;
-    let fault = texts(|c| match FaultCode::from_raw(c.fault) {
-        Some(fault) => format!("{fault:?}"),
-        None => format!("unknown fault {}", c.fault),
-    });
-    file.texts("cycles/fault", &fault)?;
-    file.row("cycles/sent", cycles.iter().map(|c| c.sent != 0))?;
-    file.row(
-        "cycles/held_back",
-        cycles.iter().map(CycleRecord::held_back),
-    )?;
-    file.row("cycles/wake_late_ns", of_32(|c| c.wake_late_ns))?;
-    file.row("cycles/compute_ns", of_32(|c| c.compute_ns))?;
-    file.row("cycles/send_ns", of_32(|c| c.send_ns))?;
-    file.row("cycles/reply_ns", of_32(|c| c.reply_ns))?;
-    file.row("cycles/missed", of_32(|c| c.missed))?;
-    file.row("cycles/trajectory_s", cycles.iter().map(|c| c.trajectory_s))?;
-    put_joints(file, "cycles/q_commanded_rad", cycles, |c| &c.q_c)
-}
-
-fn put_reports(file: &mut NpzFile, cycles: &Cycles) -> Result<()> {
-    let reports = &cycles.reports()[..];
-    let of = |number: fn(&JointReport) -> u64| reports.iter().map(number);
-    file.row("reports/stamp_ns", of(|r| r.stamp_ns))?;
-    file.row("reports/arrival_ns", of(|r| r.arrival_ns))?;
-    put_joints(file, "reports/q_rad", reports, |r| &r.q)?;
-    put_joints(file, "reports/qd_rad_s", reports, |r| &r.qd)?;
-    put_joints(file, "reports/q_target_rad", reports, |r| &r.q_target)
+    for (name, column) in columns {
+        let name = format!("{under}/{name}");
+        match column {
+            Column::Flags(flags) => file.row(&name, flags),
+            Column::U32(counts) => file.row(&name, counts),
+            Column::U64(counts) => file.row(&name, counts),
+            Column::F64(numbers) => file.row(&name, numbers),
+            Column::Joints(rows) => file.table(&name, &[JOINTS], rows.iter().map(|q| &q[..])),
+            Column::Texts(texts) => file.texts(&name, &texts),
+        }?;
+    }
+    Ok(())
 }
 
 /// As `wag.Track` has them: pixels of the left image as filmed, clamp first, lead's centre last;
@@ -133,7 +104,8 @@ fn put_plan(file: &mut NpzFile, plan: &Plan) -> Result<()> {
     let trajectory = &plan.trajectory;
     file.row("plan/target_m", plan.target_m)?;
     file.row("plan/times_s", trajectory.times_s().iter().copied())?;
-    put_joints(file, "plan/waypoints_rad", trajectory.waypoints(), |q| q)?;
+    let waypoints = trajectory.waypoints().iter().map(|q| &q.0[..]);
+    file.table("plan/waypoints_rad", &[JOINTS], waypoints)?;
     file.scalar("plan/predicted_error_m", plan.predicted_error_m)?;
     file.scalar("plan/predicted_time_s", plan.predicted_time_s)
 }
