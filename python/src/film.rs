@@ -138,14 +138,7 @@ pub(crate) fn identify_run(
         .check_covers(film.track.frames.last().map_or(0.0, |frame| frame.t_s))
         .or_input()?;
     let motion = clamp.attach().or_input()?;
-    let mut unconfirmed = film.track.unconfirmed.clone();
-    // What the camera's side of the run found, which is kept in its summary.
-    let summary = opened.summary().or_input()?.unwrap_or_default();
-    let kept = summary["track"]["unconfirmed"]
-        .as_array()
-        .into_iter()
-        .flatten();
-    unconfirmed.extend(kept.filter_map(|why| why.as_str().map(str::to_owned)));
+    let unconfirmed = film.track.unconfirmed.clone();
     if !(unconfirmed.is_empty() || accepted) {
         return Ok((None, unconfirmed));
     }

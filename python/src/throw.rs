@@ -99,17 +99,7 @@ fn ensemble(
         robust <= ROBUST_MAX,
         "`robust` is {robust}, but must be at most {ROBUST_MAX} ropes"
     );
-    // A file of before does not say how well the model explains the film.
-    let forecast = if posterior.residual_m > 0.0 {
-        PosteriorEnsemble::FORECAST
-    } else {
-        0
-    };
-    let drawn = PosteriorEnsemble::drawn(rope, posterior, robust, forecast, given.seed);
-    let count = drawn.optimised.len();
-    ensure!(
-        count == robust,
-        "what the identified rope leaves open is hardly ever a rope: {count} of {robust} could be drawn; film and identify it again"
-    );
-    Ok(drawn)
+    let from = "the identified rope";
+    let drawn = PosteriorEnsemble::of_posterior(rope, posterior, robust, given.seed, from);
+    Ok(drawn?)
 }

@@ -28,8 +28,7 @@ impl RecordedRun {
         let Some(first) = cycles.cycles.first() else {
             return Err(bad_input!("`{}` holds no control cycle", path.display()));
         };
-        let epoch_ns = run.summary().or_input()?.unwrap_or_default()["epoch_ns"].as_u64();
-        let epoch_ns = epoch_ns.filter(|ns| *ns > 0).unwrap_or(first.deadline_ns);
+        let epoch_ns = run.epoch_ns().or_input()?.unwrap_or(first.deadline_ns);
         Ok(Self {
             flaws: run.flaws().or_input()?,
             run,

@@ -184,6 +184,16 @@ impl Run {
         self.file(files::SUMMARY, files::read_json)
     }
 
+    /// When the film began that the times of its other files count from (CLOCK_MONOTONIC, ns);
+    /// none of a run without a film.
+    ///
+    /// # Errors
+    /// Its summary cannot be read.
+    pub fn epoch_ns(&self) -> Result<Option<u64>> {
+        let summary = self.summary()?.unwrap_or_default();
+        Ok(summary["epoch_ns"].as_u64().filter(|ns| *ns > 0))
+    }
+
     /// The figures of a run that threw.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ const AROUND_S: f64 = 0.3;
 /// What a rope can be identified from again without its film; t = 0 is the film's first frame.
 #[derive(Debug)]
 pub struct TrackedFilm {
-    /// Keypoints of every frame.
+    /// Keypoints of every frame, and why they should not be relied on by all that the run tells.
     pub track: KeypointTrack,
     /// Measured joints around the film.
     pub joints: JointsCsv,
@@ -27,15 +27,18 @@ impl Run {
     pub fn tracked_film(&self) -> Result<TrackedFilm> {
         let path = self.folder().join(files::KEYPOINTS);
         let name = path.display();
-        let track = self.keypoints()?.with_context(|| {
+        let mut track = self.keypoints()?.with_context(|| {
             format!("`{name}` is not there: a rope is identified again from a run whose film was tracked; `wag track --video RUN --camera RUN/camera.toml --out {name}` tracks it")
         })?;
         let summary = self.summary()?.unwrap_or_default();
-        let epoch_ns = summary["epoch_ns"].as_u64().filter(|ns| *ns > 0);
-        let epoch = MonotonicNs(epoch_ns.with_context(|| {
+        let epoch = MonotonicNs(self.epoch_ns()?.with_context(|| {
             let folder = self.folder().display();
             format!("`{folder}` does not tell when its film began (summary.json, `epoch_ns`)")
         })?);
+        // What the camera's side of the run found, which is kept in its summary.
+        let found = summary["track"]["unconfirmed"].as_array();
+        let found = found.into_iter().flatten().filter_map(|why| why.as_str());
+        track.unconfirmed.extend(found.map(str::to_owned));
         let film_s = track.frames.last().map_or(0.0, |frame| frame.t_s);
         let (from, to) = (epoch.plus_s(-AROUND_S), epoch.plus_s(film_s + AROUND_S));
         let reported = self.recording()?.cycles()?.joints_between(from.0, to.0);

@@ -45,6 +45,33 @@ impl PosteriorEnsemble {
     /// Ropes that a forecast is made with.
     pub const FORECAST: usize = 64;
 
+    /// What a rope might be instead by its posterior: `robust` ropes that the plan weighs, and those
+    /// of the forecast, where the posterior tells how well the model explains the film. `from`
+    /// says in the error where the rope comes from.
+    ///
+    /// # Errors
+    /// Hardly any of the ropes that are to be weighed could be drawn.
+    pub fn of_posterior(
+        rope: &RopeParams,
+        posterior: &RopePosterior,
+        robust: usize,
+        seed: u64,
+        from: &str,
+    ) -> Result<Self, TooFewRopes> {
+        let explains = posterior.residual_m > 0.0;
+        let forecast = if explains { Self::FORECAST } else { 0 };
+        let drawn = Self::drawn(rope, posterior, robust, forecast, seed);
+        let count = drawn.optimised.len();
+        if count == robust {
+            return Ok(drawn);
+        }
+        Err(TooFewRopes {
+            from: from.to_owned(),
+            count,
+            robust,
+        })
+    }
+
     /// `optimised` and `forecast` ropes of a posterior around the rope planned for.
     ///
     /// Parameters are taken for lognormal with the posterior's means and covariance, because
@@ -78,6 +105,20 @@ impl PosteriorEnsemble {
             joint_zero_std_rad: JOINT_ZERO_STD_RAD,
         }
     }
+}
+
+/// A posterior of which few draws are ropes.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "what {from} leaves open is hardly ever a rope: {count} of {robust} could be drawn; film and identify it again"
+)]
+pub struct TooFewRopes {
+    /// Where the rope comes from.
+    pub from: String,
+    /// Ropes that could be drawn.
+    pub count: usize,
+    /// Ropes that were wanted.
+    pub robust: usize,
 }
 
 /// Parameters but for the link count.

@@ -34,7 +34,7 @@ pub use again::{MISS_STD_M, correction, plan_again};
 pub use assess::{Shortcoming, shortcoming, warnings};
 pub use config::{PlanOptions, Robustness, ThrowConfig, ThrowWeights};
 pub use drape::{Drape, DrapeConfig};
-pub use ensemble::PosteriorEnsemble;
+pub use ensemble::{PosteriorEnsemble, TooFewRopes};
 pub use error::PlanError;
 pub use lob::{Lob, LobConfig};
 pub use planning::{plan, plan_task};

@@ -50,24 +50,14 @@ impl Observed {
         let film_s = film.track.frames.last().map_or(0.0, |frame| frame.t_s);
         clamp.check_covers(film_s).or_input()?;
         let look = format!("look at `{}`", folder.join("wiggle.png").display());
-        let mut unconfirmed = film.track.unconfirmed.clone();
-        let summary = run.summary().or_input()?.unwrap_or_default();
-        let kept = summary["track"]["unconfirmed"]
-            .as_array()
-            .into_iter()
-            .flatten();
-        unconfirmed.extend(kept.filter_map(|why| why.as_str().map(str::to_owned)));
-        confirm(&unconfirmed, accepted, &look).or_failed()?;
+        confirm(&film.track.unconfirmed, accepted, &look).or_failed()?;
         let [rope_radius_m, lead_radius_m] = film.radii_m;
         let observed = Self {
             appearance: Appearance {
                 rope_radius_m,
                 lead_radius_m,
             },
-            track: KeypointTrack {
-                unconfirmed,
-                ..film.track
-            },
+            track: film.track,
             camera,
             motion: clamp.attach().or_input()?,
             warnings: other_pole(&clamp, method).into_iter().collect(),

@@ -77,18 +77,7 @@ impl KnownRope {
             );
             return Ok(PosteriorEnsemble::default());
         };
-        // A file of before does not say how well the model explains the film.
-        let forecast = if posterior.residual_m > 0.0 {
-            PosteriorEnsemble::FORECAST
-        } else {
-            0
-        };
-        let drawn = PosteriorEnsemble::drawn(&self.params, posterior, robust, forecast, seed);
-        let count = drawn.optimised.len();
-        ensure!(
-            count == robust,
-            "what {from} leaves open is hardly ever a rope: {count} of {robust} could be drawn; film and identify it again"
-        );
-        Ok(drawn)
+        let drawn = PosteriorEnsemble::of_posterior(&self.params, posterior, robust, seed, &from);
+        Ok(drawn?)
     }
 }
