@@ -1,6 +1,6 @@
 //! `wag export` as it is typed.
 
-use crate::{Write, csv, lerobot, npz, ros2};
+use crate::{Write, csv, foxglove, lerobot, npz, ros2};
 use clap::{Args, Subcommand};
 use cli_output::{Outcome, output, println};
 use serde_json::Value;
@@ -16,6 +16,9 @@ pub enum ExportCommand {
     /// A bag of ROS 2 (MCAP), in the folder ros2 or OUT: it must not exist, or be an earlier one,
     /// which is replaced.
     Ros2(ExportArgs),
+    /// The recording with Foxglove's messages in Protobuf (MCAP), for Foxglove and Rerun, in the
+    /// file run.foxglove.mcap or OUT; in builds with `--features foxglove` only.
+    Foxglove(ExportArgs),
     /// Runs as one data set for LeRobot (format v3.0), an episode each; in builds with
     /// `--features lerobot` only.
     Lerobot(LerobotArgs),
@@ -56,6 +59,7 @@ impl ExportCommand {
             Self::Csv(args) => ("csv", of_run(args, csv)),
             Self::Npz(args) => ("npz", of_run(args, npz)),
             Self::Ros2(args) => ("ros2", of_run(args, ros2)),
+            Self::Foxglove(args) => ("foxglove", of_run(args, foxglove)),
             Self::Lerobot(args) => ("lerobot", lerobot(&args.runs, &args.out, args.fps)),
         };
         let written = written?;

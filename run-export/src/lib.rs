@@ -17,6 +17,7 @@
 mod command;
 mod csv;
 mod destination;
+mod foxglove;
 mod lerobot;
 mod npz;
 mod recorded;
@@ -25,6 +26,7 @@ mod written;
 
 pub use command::{ExportArgs, ExportCommand, LerobotArgs};
 pub use csv::csv;
+pub use foxglove::foxglove;
 pub use lerobot::lerobot;
 pub use npz::npz;
 pub use ros2::ros2;

@@ -1,10 +1,11 @@
 //! A recorded run, from its folder or its file.
 
 use crate::files::cannot_read;
-use crate::mcap_file::{RunFilm, is_mcap, messages, replay_bytes};
+use crate::mcap_file::{RunFilm, Walked, is_mcap, messages, replay_bytes, walk};
 use crate::{Channel, CommandLine, Cycles, Explanation, RunLog, explain, files};
 use anyhow::{Context, Result, bail, ensure};
 use arm_model::Cell;
+use mcap::records::Record;
 use rt_controller::recording::{Item, LogReader, Read};
 use serde_json::Value;
 use shared_types::{KeypointTrack, Plan, RopeParams};
@@ -89,6 +90,11 @@ impl Run {
         &self.folder
     }
 
+    /// The run's file: pictures and messages, where it has any.
+    pub fn file_path(&self) -> &Path {
+        &self.film
+    }
+
     /// The exact recording; [`NoRecording`] where there is none.
     pub fn recording(&self) -> Result<Recording> {
         let path = self.recorded.clone();
@@ -127,9 +133,23 @@ impl Run {
         &self,
         each: impl FnMut(Channel, u64, &[u8]) -> Result<()>,
     ) -> Result<Vec<String>> {
+        self.read_file(|bytes| messages(bytes, each))
+    }
+
+    /// Hands schemas, channels, messages, attachments and metadata of the run's file to `each` in
+    /// the order of the file; what is missing of the file, in words.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no MCAP file, or `each` fails.
+    pub fn records(&self, each: impl FnMut(&Record<'_>) -> Result<()>) -> Result<Vec<String>> {
+        self.read_file(|bytes| walk(bytes, each))
+    }
+
+    fn read_file(&self, walk: impl FnOnce(&[u8]) -> Result<Walked>) -> Result<Vec<String>> {
         let fail = || format!("run file `{}`", self.film.display());
         let bytes = std::fs::read(&self.film).map_err(cannot_read(&self.film));
-        Self::walk(&bytes.with_context(fail)?, each).with_context(fail)
+        let walked = walk(&bytes.with_context(fail)?).with_context(fail)?;
+        Ok(Self::flaws_of(&walked))
     }
 
     /// What is missing of the run's file, in words; nothing of one that an older version wrote.
@@ -142,17 +162,13 @@ impl Run {
         }
         let bytes = std::fs::read(&self.film).map_err(cannot_read(&self.film))?;
         if is_mcap(&bytes) {
-            Self::walk(&bytes, |_, _, _| Ok(()))
+            Ok(Self::flaws_of(&walk(&bytes, |_| Ok(()))?))
         } else {
             Ok(Vec::new())
         }
     }
 
-    fn walk(
-        bytes: &[u8],
-        each: impl FnMut(Channel, u64, &[u8]) -> Result<()>,
-    ) -> Result<Vec<String>> {
-        let walked = messages(bytes, each)?;
+    fn flaws_of(walked: &Walked) -> Vec<String> {
         let damaged = format!("{} damaged chunks of its file", walked.damaged_chunks);
         let flaws = [
             (walked.damaged_chunks > 0, damaged),
@@ -161,11 +177,8 @@ impl Run {
                 "the end of its file, which breaks off".to_owned(),
             ),
         ];
-        Ok(flaws
-            .into_iter()
-            .filter(|(holds, _)| *holds)
-            .map(|(_, words)| words)
-            .collect())
+        let told = flaws.into_iter().filter(|(holds, _)| *holds);
+        told.map(|(_, words)| words).collect()
     }
 
     /// A file of the folder, read by `read` where it is there.

@@ -112,6 +112,7 @@ fn record(path: &Path) {
         // Later in the file than in time.
         file.json(Channel::Log, AHEAD_NS + at_ns(9), &line).unwrap();
     }
+    scene(&mut file);
     file.finish().unwrap();
 }
 
@@ -160,11 +161,46 @@ fn transform(parent: &str, child: &str, x: f64) -> Value {
     })
 }
 
+fn colour() -> Value {
+    json!({ "r": 1.0, "g": 0.6, "b": 0.0, "a": 1.0 })
+}
+
+/// A line and a ball in the pole's frame, in place of what was there.
+fn scene(file: &mut McapFile) {
+    let wall_ns = AHEAD_NS + BEGIN_NS;
+    let at = |x: f64| json!({ "x": x, "y": -0.25, "z": 1e-7 });
+    let pose = json!({
+        "position": at(0.125), "orientation": { "x": 0.5, "y": -0.5, "z": 0.5, "w": 0.5 },
+    });
+    let line = json!({
+        "type": 2, "pose": pose, "thickness": 0.004, "scale_invariant": false, "color": colour(),
+        "points": [at(0.0), at(0.1)], "colors": [], "indices": [1, 0],
+    });
+    let entity = json!({
+        "frame_id": "pole_end", "id": "rope", "lifetime": { "sec": -1, "nsec": 500_000_000 },
+        "frame_locked": true, "metadata": [{ "key": "k", "value": "é" }], "arrows": [],
+        "cubes": [], "spheres": [{ "pose": pose, "size": at(0.02), "color": colour() }],
+        "cylinders": [], "lines": [line], "triangles": [], "texts": [], "models": [],
+    });
+    let then = json!({ "sec": 1_700_000_007, "nsec": 124 });
+    let update = json!({
+        "deletions": [{ "timestamp": then, "type": 1, "id": "" }], "entities": [entity],
+    });
+    file.json(Channel::Scene, wall_ns, &update).unwrap();
+    let plan = json!({ "timestamp": then, "plan": { "target_m": [0.9, 0.1, 0.0] } });
+    file.json(Channel::Plan, wall_ns, &plan).unwrap();
+    let urdf = b"<?xml version=\"1.0\"?><robot/>";
+    file.attach(wall_ns, "robot.urdf", "application/xml", urdf)
+        .unwrap();
+    let table = [("wall_minus_monotonic_ns", AHEAD_NS.to_string())];
+    file.metadata("wag", &table).unwrap();
+}
+
 /// A camera that is told, with its pictures and what was tracked in them: nothing in one.
 fn film(file: &mut McapFile) {
     let wall_ns = AHEAD_NS + BEGIN_NS;
     let eye = json!({
-        "width": 640, "height": 360, "distortion_model": "plumb_bob",
+        "frame_id": "camera_left", "width": 640, "height": 360, "distortion_model": "plumb_bob",
         "D": [-0.17, 0.02, 4e-4, -3e-4, -0.002], "K": NINE, "R": TURNED,
         "P": [500.0, 0.0, 320.5, 0.0, 0.0, 501.0, 180.5, 0.0, 0.0, 0.0, 1.0, 0.25],
     });
@@ -185,8 +221,8 @@ fn film(file: &mut McapFile) {
         let points: Vec<_> = (0..4).filter(|_| picture != 3).map(point).collect();
         let drawn = |kind: u32| {
             json!({
-                "type": kind, "points": points, "thickness": 4.0,
-                "outline_color": { "r": 1.0, "g": 0.6, "b": 0.0, "a": 1.0 },
+                "type": kind, "points": points, "thickness": 4.0, "outline_color": colour(),
+                "outline_colors": [], "metadata": [],
             })
         };
         let seen = json!({ "circles": [], "points": [drawn(1), drawn(3)], "texts": [] });

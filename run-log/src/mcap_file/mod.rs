@@ -1,4 +1,4 @@
-//! `run.mcap`: a run in one file that Foxglove, rerun and PlotJuggler show.
+//! `run.mcap`: a run in one file that Foxglove and PlotJuggler show.
 //!
 //! A process of its own writes it while the run goes on. It only listens, with low
 //! priority: it loses records of its own where it is slow and holds neither the
@@ -28,7 +28,7 @@ pub use feed::{Feed, Sink};
 pub(crate) use film::GAP_NS;
 pub use film::{RunFilm, RunPart};
 pub use image::left_jpeg;
-pub(crate) use read::{is_mcap, messages, replay_bytes};
+pub(crate) use read::{Walked, is_mcap, messages, replay_bytes, walk};
 pub use recorder::{Recorded, RecorderConfig, run as record};
 pub use recover::{Recovered, recover};
 pub use results::{RopeMotion, SimulateRope};

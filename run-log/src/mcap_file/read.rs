@@ -61,7 +61,7 @@ fn is_attachment(body: &[u8]) -> bool {
 ///
 /// # Errors
 /// The bytes are no MCAP file, or `each` fails.
-pub(super) fn walk(
+pub(crate) fn walk(
     bytes: &[u8],
     mut each: impl FnMut(&Record<'_>) -> Result<()>,
 ) -> Result<Walked> {

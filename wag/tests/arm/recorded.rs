@@ -68,6 +68,26 @@ fn exports_agree(run: &Path) {
     assert!(output.status.success(), "{}", said(&output));
 }
 
+/// A published Python library reads the run's Protobuf, where it is there.
+fn protobuf_agrees(run: &Path) {
+    const TOPICS: &str = "/arm/measured /arm/commanded /controller/cycles /tf /scene /log";
+    let python = missing::named(
+        "WAG_SDK_PYTHON",
+        "Python with mcap and mcap-protobuf-support",
+    );
+    let Some(python) = python else {
+        return;
+    };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../.ci/validate-protobuf");
+    let mut python = Command::new(python);
+    python.arg(script).arg(run.join("run.mcap"));
+    python
+        .arg(run.join("run.foxglove.mcap"))
+        .args(TOPICS.split(' '));
+    let output = python.output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+}
+
 /// Replays a run, which has no gap and begins with a cycle; what was found.
 fn replays_exactly(run: &str) -> Value {
     let found = json(&format!("replay {run}"))["replay"].clone();
@@ -180,6 +200,10 @@ fn its_file_is_whole(run: &Path) {
         json(&format!("export {format} {name}"));
     }
     exports_agree(run);
+    if cfg!(feature = "foxglove") {
+        json(&format!("export foxglove {name}"));
+        protobuf_agrees(run);
+    }
     let shown = counts["/controller/cycles"];
     assert!(shown.abs_diff(exact) < 500, "{exact} cycles, {counts:?}");
     let reported = json(&format!("record recover {}", file.display()));

@@ -1,0 +1,92 @@
+//! A run's recording with the messages of the Foxglove SDK, in Protobuf, which Foxglove and Rerun
+//! show without set-up.
+//!
+//! Recordings themselves are JSON, which any tool reads: `encoding` turns their messages into the
+//! SDK's types, `file` writes the rest as it is. Needs the feature `foxglove`: the SDK brings
+//! crates that nothing else here has.
+
+#[cfg(feature = "foxglove")]
+mod encoding;
+#[cfg(feature = "foxglove")]
+mod file;
+
+use crate::written::Written;
+use cli_output::Outcome;
+use std::path::Path;
+
+/// Writes the file `out`, or else `run.foxglove.mcap` in the run's folder: `run.mcap` with the
+/// same topics, times, attachments and tables of texts, its `foxglove.*` messages in Protobuf
+/// with the descriptors of Foxglove's SDK. The messages of this program stay JSON; the exact
+/// recording for replay is left out.
+///
+/// # Errors
+/// The run has no `run.mcap`, or one with a message that is not as this program writes it, or
+/// none of a type of Foxglove's; `out` is `run.mcap` itself, or cannot be written.
+#[cfg(feature = "foxglove")]
+pub fn foxglove(run: &Path, out: Option<&Path>) -> Outcome<Written> {
+    use crate::written::WrittenFile;
+    use cli_output::{OrInput, bad_input};
+    use run_log::{Run, files};
+    use serde_json::json;
+
+    /// Name of the file, where none is given.
+    const FILE: &str = "run.foxglove.mcap";
+
+    let opened = Run::open(run).or_input()?;
+    let path = out.map_or_else(|| opened.folder().join(FILE), Path::to_owned);
+    let same = |other: &Path| path.canonicalize().ok() == other.canonicalize().ok();
+    if path.exists() && same(opened.file_path()) {
+        let name = path.display();
+        return Err(bad_input!(
+            "`{name}` is the run's recording, which is not replaced: name another file with --out"
+        ));
+    }
+    files::check_writable(&path).or_input()?;
+    let mut file = file::FoxgloveFile::new().or_failed()?;
+    let mut missing = opened.records(|record| file.add(record)).or_input()?;
+    let (messages, converted) = file.counts();
+    if converted == 0 {
+        let name = run.display();
+        return Err(bad_input!(
+            "`{name}` holds no message of a type of Foxglove's"
+        ));
+    }
+    missing.extend(file.silent_topics());
+    let bytes = file.finish().or_failed()?;
+    files::write_atomic(&path, &bytes).or_failed()?;
+    Ok(Written {
+        run: run.to_owned(),
+        files: vec![WrittenFile {
+            path,
+            count: messages,
+            of: "messages",
+        }],
+        figures: json!({ "messages": messages, "protobuf": converted, "bytes": bytes.len() }),
+        missing,
+    })
+}
+
+/// Always refuses.
+///
+/// # Errors
+/// How a build that can is made.
+#[cfg(not(feature = "foxglove"))]
+pub fn foxglove(_run: &Path, _out: Option<&Path>) -> Outcome<Written> {
+    Err(cli_output::bad_input!(
+        "this build cannot write the messages of Foxglove's SDK; build it with `cargo build \
+         --release -p wag --features foxglove` (the Debian package has it). Foxglove opens \
+         run.mcap as it is, too"
+    ))
+}
+
+#[cfg(all(test, not(feature = "foxglove")))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_build_without_it_says_how_one_with_it_is_made() {
+        let failure = foxglove(Path::new("run"), None).unwrap_err();
+        assert_eq!(failure.exit_code(), 2);
+        assert!(failure.to_string().contains("--features foxglove"));
+    }
+}
