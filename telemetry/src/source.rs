@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use run_log::{CellHere, Feed, Sink};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 use viewer::live::{Joined, Wanted, newest_domain};
 
@@ -107,7 +107,7 @@ impl Source {
     /// Folder of the run that is told, where it is known.
     pub fn run(&self) -> Option<&Path> {
         let facts = self.attached.as_ref()?.joined.facts()?;
-        facts.folder.as_ref().map(PathBuf::as_path)
+        facts.folder.as_deref()
     }
 }
 
