@@ -64,6 +64,9 @@ pub fn run(
     here: CellHere,
     seconds: Option<f64>,
 ) -> Outcome<Option<Value>> {
+    // Whatever happens here may wait; what is told of may not. Threads have what the one that starts
+    // them has.
+    let _ = rustix::process::nice(NICE);
     let mut source = Source::new(wanted, here).or_input()?;
     let mut sinks = Sinks(Vec::new());
     let mut report = json!({ "ok": true, "command": "watch" });
@@ -78,8 +81,6 @@ pub fn run(
         sinks.0.push(Box::new(socket));
     }
     output::object(&report);
-    // Whatever happens here may wait; what is told of may not.
-    let _ = rustix::process::nice(NICE);
     let (began, span_s) = (Instant::now(), seconds.unwrap_or(f64::INFINITY));
     let mut named = None;
     while !is_interrupted() && began.elapsed().as_secs_f64() < span_s {
