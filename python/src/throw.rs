@@ -86,6 +86,30 @@ pub(crate) fn plan(
     })
 }
 
+/// Ropes (JSON, a list) drawn from what an identified rope (JSON) may be by its posterior (JSON).
+#[pyfunction]
+pub(crate) fn drawn_ropes(
+    rope: &str,
+    posterior: &str,
+    count: usize,
+    seed: u64,
+) -> PyResult<String> {
+    let rope = rope_of_json(rope)?;
+    let posterior = serde_json::from_str::<RopePosterior>(posterior).context("posterior");
+    let drawn = PosteriorEnsemble::drawn(&rope, &posterior.or_input()?, count, 0, seed).optimised;
+    enough(drawn.len(), count).or_failed()?;
+    serde_json::to_string(&drawn).or_failed()
+}
+
+/// Refuses a posterior of which hardly anything is a rope.
+fn enough(drawn: usize, count: usize) -> anyhow::Result<()> {
+    ensure!(
+        drawn == count,
+        "what the identified rope leaves open is hardly ever a rope: {drawn} of {count} could be drawn; film and identify it again"
+    );
+    Ok(())
+}
+
 /// What the rope might be instead, as `wag plan` takes it.
 fn ensemble(
     rope: &RopeParams,
@@ -106,10 +130,6 @@ fn ensemble(
         0
     };
     let drawn = PosteriorEnsemble::drawn(rope, posterior, robust, forecast, given.seed);
-    let count = drawn.optimised.len();
-    ensure!(
-        count == robust,
-        "what the identified rope leaves open is hardly ever a rope: {count} of {robust} could be drawn; film and identify it again"
-    );
+    enough(drawn.optimised.len(), robust)?;
     Ok(drawn)
 }
