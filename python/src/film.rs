@@ -3,17 +3,19 @@
 use crate::error::{OrRaise, interruptible, raised};
 use crate::motion::{Motion, cell_of};
 use crate::threads::THREADS_MAX;
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use camera_ingest::source::read_film;
 use camera_ingest::{load_camera, open_video};
+use numpy::ndarray::Array3;
+use numpy::{IntoPyArray, PyArray3, PyReadonlyArray1};
 use planner::PlannerConfig;
-use planner::identify::{IdentifyOptions, Method};
+use planner::identify::{IdentifyOptions, Method, fitted_keypoints};
 use planner::observation::{Appearance, Observation, ObservedPoints};
 use pyo3::prelude::*;
 use rope_sim::AttachMotion;
 use run_log::{ClampMotion, Run, files};
 use serde_json::json;
-use shared_types::{KeypointTrack, StereoCamera};
+use shared_types::{KeypointTrack, RopeEstimate, StereoCamera};
 use std::path::PathBuf;
 
 /// Tracks the rope through a film: keypoints, and what the rope looks like, as JSON.
@@ -144,6 +146,37 @@ pub(crate) fn identify_run(
     }
     let found = estimate(py, &film.track, (&camera, &*motion, film.radii_m), &how)?;
     Ok((Some(found), unconfirmed))
+}
+
+/// Pixels, (frames, keypoints, 2), at which an identified rope (JSON) is seen in frames that begin
+/// at these times; not a number behind the camera.
+#[pyfunction]
+pub(crate) fn fitted_pixels<'py>(
+    py: Python<'py>,
+    estimate: &str,
+    camera: PathBuf,
+    motion: Py<Motion>,
+    times_s: PyReadonlyArray1<'py, f64>,
+    keypoints: usize,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    /// Longest film that is simulated (s).
+    const FILM_MAX_S: f64 = 600.0;
+    let estimate = serde_json::from_str::<RopeEstimate>(estimate).context("estimate");
+    let estimate = estimate.or_input()?;
+    let camera = load_camera(&camera).or_input()?;
+    let times_s = times_s.as_array().to_vec();
+    if let Some(t) = times_s.iter().find(|t| !(0.0..=FILM_MAX_S).contains(*t)) {
+        let told = anyhow!("`t_s` has {t} in it, but a film's frames are 0 to {FILM_MAX_S} s");
+        return Err(told).or_input();
+    }
+    let motion = motion.get();
+    motion.check_covers(times_s.iter().copied().fold(0.0, f64::max))?;
+    let seen = py
+        .detach(|| fitted_keypoints(&estimate, &camera, motion.attach(), &times_s, keypoints))
+        .or_input()?;
+    let shape = (times_s.len(), keypoints, 2);
+    let pixel = |(i, k, axis): (usize, usize, usize)| seen[i][k].map_or(f64::NAN, |p| p[axis]);
+    Ok(Array3::from_shape_fn(shape, pixel).into_pyarray(py))
 }
 
 fn estimate(

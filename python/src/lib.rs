@@ -23,9 +23,9 @@ mod _wag {
     #[pymodule_export]
     use crate::error::{FailedError, InputError};
     #[pymodule_export]
-    use crate::film::{identify, identify_run, track};
+    use crate::film::{fitted_pixels, identify, identify_run, track};
     #[pymodule_export]
-    use crate::motion::{Motion, ranges_rad};
+    use crate::motion::{Motion, ranges_rad, spline};
     #[pymodule_export]
     use crate::rig::Rig;
     #[pymodule_export]
@@ -37,7 +37,7 @@ mod _wag {
     #[pymodule_export]
     use crate::stepwise::HangingRopes;
     #[pymodule_export]
-    use crate::throw::plan;
+    use crate::throw::{drawn_ropes, plan};
 
     #[pymodule_export]
     const VERSION: &str = shared_types::VERSION;

@@ -4,7 +4,7 @@ use crate::error::OrRaise;
 use crate::threads::on_threads;
 use anyhow::{Context, anyhow, ensure};
 use arm_model::limits::{LimitKind, Margin};
-use arm_model::{Cell, JOINTS, JointTrajectory, JointVector, Limits, Pole};
+use arm_model::{Cell, JOINTS, JointState, JointTrajectory, JointVector, Limits, Pole};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{
     AllowTypeChange, IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayLike1, PyArrayLike2,
@@ -24,6 +24,8 @@ type Numbers3<'py> = PyArrayLike3<'py, f64, AllowTypeChange>;
 
 /// One number for each throw.
 type Array<'py, T> = Bound<'py, PyArray1<T>>;
+/// One row for each time.
+type Table<'py> = Bound<'py, PyArray2<f64>>;
 
 /// Motion of the rope's clamp in time: t = 0 is its begin, or a film's first frame.
 #[pyclass(frozen, module = "wag")]
@@ -143,6 +145,26 @@ fn joints_of(times_s: &Numbers1<'_>, q_rad: &Numbers2<'_>) -> PyResult<JointsCsv
         })
     };
     joints().or_input()
+}
+
+/// Positions, velocities and accelerations, (times, 7) each, of the clamped cubic spline through
+/// these joints; at rest before and after it.
+#[pyfunction]
+#[pyo3(signature = (times_s, q_rad, at_s))]
+pub(crate) fn spline<'py>(
+    py: Python<'py>,
+    times_s: Numbers1<'py>,
+    q_rad: Numbers2<'py>,
+    at_s: Numbers1<'py>,
+) -> PyResult<(Table<'py>, Table<'py>, Table<'py>)> {
+    let joints = joints_of(&times_s, &q_rad)?;
+    let trajectory = JointTrajectory::new(&joints.times_s, &joints.q).or_input()?;
+    let at_s = at_s.as_array();
+    let states: Vec<JointState> = at_s.iter().map(|t| trajectory.state_at(*t)).collect();
+    let table = |of: fn(&JointState) -> JointVector| {
+        Array2::from_shape_fn((states.len(), JOINTS), |(i, j)| of(&states[i])[j]).into_pyarray(py)
+    };
+    Ok((table(|s| s.q), table(|s| s.qd), table(|s| s.qdd)))
 }
 
 #[pymethods]

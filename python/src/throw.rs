@@ -86,6 +86,23 @@ pub(crate) fn plan(
     })
 }
 
+/// Where a rope comes from, for errors.
+const FROM: &str = "the identified rope";
+
+/// Ropes (JSON, a list) drawn from what an identified rope (JSON) may be by its posterior (JSON).
+#[pyfunction]
+pub(crate) fn drawn_ropes(
+    rope: &str,
+    posterior: &str,
+    count: usize,
+    seed: u64,
+) -> PyResult<String> {
+    let rope = rope_of_json(rope)?;
+    let posterior = serde_json::from_str::<RopePosterior>(posterior).context("posterior");
+    let drawn = PosteriorEnsemble::of_posterior(&rope, &posterior.or_input()?, count, seed, FROM);
+    serde_json::to_string(&drawn.or_failed()?.optimised).or_failed()
+}
+
 /// What the rope might be instead, as `wag plan` takes it.
 fn ensemble(
     rope: &RopeParams,
@@ -99,7 +116,6 @@ fn ensemble(
         robust <= ROBUST_MAX,
         "`robust` is {robust}, but must be at most {ROBUST_MAX} ropes"
     );
-    let from = "the identified rope";
-    let drawn = PosteriorEnsemble::of_posterior(rope, posterior, robust, given.seed, from);
+    let drawn = PosteriorEnsemble::of_posterior(rope, posterior, robust, given.seed, FROM);
     Ok(drawn?)
 }

@@ -80,19 +80,29 @@ def test_the_rope_of_a_run_is_identified_again(run):
     assert low < found.rope.length_m < high and found.covariance.shape == (9, 9)
     plan = wag.plan("strike", found, [0.95, 0.0, 0.2])
     assert plan.forecast is not None
+    ropes = found.draw(400, seed=1)
+    masses, lengths = ([getattr(r, k) for r in ropes] for k in ("lead_mass_kg", "length_m"))
+    assert np.mean(lengths) == pytest.approx(found.mean[1], abs=1e-3)
+    assert np.std(masses) == pytest.approx(np.sqrt(found.covariance[6, 6]), rel=0.2)
+    assert ropes == found.draw(400, seed=1) and ropes != found.draw(400, seed=2)
+    with pytest.raises(wag.InputError, match="count"):
+        found.draw(0)
+    motion = kept.motion()
+    with pytest.raises(wag.InputError, match="t_s"):
+        found.keypoints_px(run / "camera.toml", motion, [np.nan])
+    with pytest.raises(wag.InputError, match="film lasts"):
+        found.keypoints_px(run / "camera.toml", motion, [500.0])
+    with pytest.raises(wag.InputError, match="joint reports"):
+        kept.motion(1e6)
 
 
 def test_a_film_is_tracked_as_the_run_did(run):
     kept = wag.load_run(run)
     film = next(Path(run).glob("wiggle_*.yuyv"))
-    reports, epoch = kept.reports, kept.epoch_ns
-    t_s = (reports["stamp_ns"].astype(np.int64) - epoch) * 1e-9
-    around = (t_s > -0.3) & (t_s < kept.keypoints.t_s[-1] + 0.3)
-    motion = wag.Motion.joints(t_s[around], reports["q_rad"][around])
-    track = wag.track(film, run / "camera.toml", motion)
+    track = wag.track(film, run / "camera.toml", kept.motion(0.0, kept.keypoints.t_s[-1]))
     apart = np.linalg.norm(track.points_px - kept.keypoints.points_px, axis=2)
     assert np.median(apart) < 0.1 and not track.unconfirmed
-    short = wag.Motion.joints(t_s[around][:100], reports["q_rad"][around][:100])
+    short = kept.motion(0.0, 0.5)
     with pytest.raises(wag.InputError, match="film lasts"):
         wag.track(film, run / "camera.toml", short)
 

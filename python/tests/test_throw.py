@@ -21,6 +21,20 @@ def test_a_plan_hits_in_the_simulation_and_can_be_thrown(tmp_path):
     assert kept["trajectory_sha256"] == plan.details["trajectory_sha256"]
 
 
+def test_joints_of_a_plan_are_its_spline():
+    plan = wag.plan("strike", wag.Rope.random(1), [0.95, 0.0, 0.2], seed=1)
+    q_rad, qd_rad_s, qdd_rad_s2 = plan.joints(plan.times_s)
+    assert np.allclose(q_rad, plan.waypoints_rad, atol=1e-12) and np.allclose(qd_rad_s[[0, -1]], 0.0)
+    t_s, h_s = np.linspace(0.1, plan.duration_s - 0.1, 50), 1e-4
+    before, after = plan.joints(t_s - h_s), plan.joints(t_s + h_s)
+    _, speeds, accelerations = plan.joints(t_s)
+    assert np.abs((after[0] - before[0]) / (2 * h_s) - speeds).max() < 1e-4
+    assert np.abs((after[1] - before[1]) / (2 * h_s) - accelerations).max() < 0.01
+    assert np.allclose(plan.joints([plan.duration_s + 1.0])[0], plan.waypoints_rad[-1])
+    with pytest.raises(wag.InputError, match="at_s"):
+        plan.joints([[0.5]])
+
+
 def test_a_target_out_of_reach_is_refused():
     with pytest.raises(wag.InputError, match="out of reach"):
         wag.plan("strike", wag.Rope.random(1), [3.0, 0.0, 0.2])

@@ -119,6 +119,13 @@ def identify(
 def identify_run(
     run: _Path, how: dict[str, Any], accepted: bool, cell: _Path | None = None
 ) -> tuple[str | None, list[str]]: ...
+def fitted_pixels(
+    estimate: str, camera: _Path, motion: Motion, times_s: _Floats, keypoints: int
+) -> _Floats: ...
+def drawn_ropes(rope: str, posterior: str, count: int, seed: int) -> str: ...
+def spline(
+    times_s: npt.ArrayLike, q_rad: npt.ArrayLike, at_s: npt.ArrayLike
+) -> tuple[_Floats, _Floats, _Floats]: ...
 def plan(
     task: str,
     rope: str,

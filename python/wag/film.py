@@ -122,6 +122,25 @@ class Estimate:
             details=found,
         )
 
+    def keypoints_px(
+        self, camera: PathLike, motion: Motion, t_s: npt.ArrayLike, *, keypoints: int = 24
+    ) -> Floats:
+        """Where the simulated rope's keypoints are seen in frames at `t_s`, (frames, keypoints, 2).
+
+        With the clocks' offset and the camera's place as the fit found them: what is left between
+        them and `Track.points_px` is the residual. NaN behind the camera.
+        """
+        frames_s = numbers("t_s", t_s, (None,))
+        keypoints = whole("keypoints", keypoints, 2, 32)
+        return _wag.fitted_pixels(json.dumps(self.details), camera, motion, frames_s, keypoints)
+
+    def draw(self, count: int, *, seed: int = 0) -> list[Rope]:
+        """Ropes that it might be instead, drawn from the posterior as the planner draws them."""
+        posterior = json.dumps(self.details["posterior"])
+        count, seed = whole("count", count, 1, 1_000_000), whole("seed", seed, 0)
+        drawn = _wag.drawn_ropes(self.rope.to_json(), posterior, count, seed)
+        return [Rope(**rope) for rope in json.loads(drawn)]
+
     def save(self, path: PathLike) -> None:
         """Writes the rope file that `wag plan --rope` takes, uncertainty included."""
         _wag.write_rope(path, self.rope.to_json(), json.dumps(self.details), self.unconfirmed)

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _wag
+from ._wag import Motion
 from .film import PathLike, Track
+from .given import number
 from .rope import Rope
 
 if TYPE_CHECKING:
@@ -41,6 +43,25 @@ class Run:
         epoch_ns = (self.summary or {}).get("epoch_ns") or 0
         deadlines = self.cycles["deadline_ns"]
         return epoch_ns or (int(deadlines[0]) if len(deadlines) else 0)
+
+    def motion(
+        self, start_s: float = 0.0, end_s: float | None = None, *, cell: PathLike | None = None
+    ) -> Motion:
+        """The clamp's motion as the arm reported its joints, with t = 0 at `start_s`.
+
+        start_s, end_s: in s since `epoch_ns`, where the film of a wiggle begins; to the end
+            without `end_s`. A quarter of a second on either side is kept as well.
+        """
+        around_s = 0.25
+        stamps_ns = self.reports["stamp_ns"].astype(np.int64)
+        since_s = (stamps_ns - self.epoch_ns) * 1e-9 - number("start_s", start_s)
+        kept = since_s >= -around_s
+        if end_s is not None:
+            kept &= since_s <= number("end_s", end_s) - start_s + around_s
+        if not kept.any():
+            words = f"`{self.folder}` holds no joint reports from {start_s} s on"
+            raise _wag.InputError(f"{words}: times count from its `epoch_ns`")
+        return Motion.joints(since_s[kept], self.reports["q_rad"][kept], cell=cell)
 
     def cycles_frame(self) -> pd.DataFrame:
         """Control cycles as a pandas data frame over time (s since `epoch_ns`)."""

@@ -61,6 +61,10 @@ class Plan:
         """The clamp's motion under an arm that follows the plan exactly, in the plan's own cell."""
         return Motion.waypoints(self.times_s, self.waypoints_rad, cell=cell or self.cell)
 
+    def joints(self, at_s: npt.ArrayLike) -> tuple[Floats, Floats, Floats]:
+        """Positions, velocities and accelerations of the joints, (times, 7) each, in rad and s."""
+        return _wag.spline(self.times_s, self.waypoints_rad, numbers("at_s", at_s, (None,)))
+
     def save(self, path: PathLike, *, allow_miss: bool = False) -> None:
         """Writes the ``plan.json`` that `wag throw` takes; a plan with a shortcoming only if told so."""
         if self.shortcoming is not None and not allow_miss:

@@ -20,6 +20,7 @@ mod descent;
 mod error;
 mod film;
 mod fit;
+mod fitted;
 mod information;
 mod linear;
 mod network;
@@ -39,6 +40,7 @@ mod tests;
 
 pub use error::IdentifyError;
 pub use fit::WIDE;
+pub use fitted::{SeenKeypoints, fitted_keypoints};
 pub use information::{WiggleInformation, information};
 pub use options::{IdentifyOptions, Method, tape_length_m};
 
