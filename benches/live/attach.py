@@ -5,7 +5,7 @@ During one run of each pair, a program that looks on is started, let look for a 
 over and over; during the other there is none. Which comes first alternates. Cycles that the
 controller missed are counted in the whole run and in the throw.
 
-    python3 benches/live/attach.py --wag target/release/wag --pairs 5 --seed 1 -- --foxglove 127.0.0.1:0
+    python3 benches/live/attach.py --wag target/release/wag --pairs 5 --seed 1 -- --foxglove=127.0.0.1:0
 
 Prints one line of JSON per run, and a summary. Python's standard library only.
 """

@@ -4,7 +4,7 @@ use crate::foxglove::Socket;
 use crate::source::Source;
 use anyhow::Result;
 use clap::Args;
-use cli_output::{Failure, OrInput, Outcome, is_interrupted, output, println};
+use cli_output::{OrInput, Outcome, is_interrupted, output, println};
 use run_log::{CellHere, Channel, Sink};
 use serde_json::{Value, json};
 use std::net::SocketAddr;
@@ -20,12 +20,14 @@ const NICE: i32 = 10;
 #[derive(Debug, Clone, Args)]
 pub struct TelemetryArgs {
     /// Instead of the page, a socket for the application Foxglove, with the topics of run.mcap:
-    /// it can be looked at, and nothing more. Anything but loopback lets other machines look on,
-    /// without encryption. In builds with `--features foxglove` only.
+    /// it can be looked at, and nothing more. Every program of this machine can look on, a page in
+    /// its browser too; anything but loopback lets other machines look on, without encryption. In
+    /// builds with `--features foxglove` only.
     #[arg(
         long,
         value_name = "ADDR:PORT",
         num_args = 0..=1,
+        require_equals = true,
         default_missing_value = "127.0.0.1:8765",
         conflicts_with_all = ["bind", "preview", "camera"]
     )]
@@ -52,6 +54,10 @@ impl Sink for Sinks {
         let mut sinks = self.0.iter_mut();
         sinks.try_for_each(|sink| sink.message(channel, at_ns, message))
     }
+
+    fn begin_anew(&mut self) {
+        self.0.iter_mut().for_each(|sink| sink.begin_anew());
+    }
 }
 
 /// Tells the messages of the run that is wanted until Ctrl-C, or for a while.
@@ -67,18 +73,19 @@ pub fn run(
     // Whatever happens here may wait; what is told of may not. Threads have what the one that starts
     // them has.
     let _ = rustix::process::nice(NICE);
-    let mut source = Source::new(wanted, here).or_input()?;
     let mut sinks = Sinks(Vec::new());
     let mut report = json!({ "ok": true, "command": "watch" });
     if let Some(bind) = args.foxglove {
-        let socket = Socket::start(bind).map_err(Failure::of_server)?;
-        let url = socket.url();
+        let socket = Socket::start(bind)?;
+        report["foxglove"] = socket.url().into();
+        sinks.0.push(Box::new(socket));
+    }
+    let mut source = Source::new(wanted, here).or_input()?;
+    if let (Some(bind), Some(url)) = (args.foxglove, report["foxglove"].as_str()) {
         println!("{url}\nOpen it in Foxglove (\"Open connection\"); Ctrl-C ends it.");
         if !bind.ip().is_loopback() {
             eprintln!("warning: whoever reaches {} can look on", bind.ip());
         }
-        report["foxglove"] = url.into();
-        sinks.0.push(Box::new(socket));
     }
     output::object(&report);
     let (began, span_s) = (Instant::now(), seconds.unwrap_or(f64::INFINITY));

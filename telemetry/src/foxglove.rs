@@ -6,19 +6,24 @@
 #[cfg(feature = "foxglove")]
 mod socket {
     use anyhow::{Context as _, Result};
+    use cli_output::{Failure, Outcome};
     use foxglove::{
-        ChannelBuilder, Context, PartialMetadata, RawChannel, Schema, WebSocketServer,
-        WebSocketServerHandle,
+        ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema,
+        WebSocketServer, WebSocketServerHandle,
     };
     use run_log::{Channel, Sink};
     use serde_json::Value;
     use std::net::SocketAddr;
     use std::sync::Arc;
 
+    /// Messages that wait for a client at most: more than a second of all but the fast ones. A
+    /// picture may have half a megabyte.
+    const BACKLOG: usize = 64;
+
     /// A server with all channels of a run.
     #[derive(Debug)]
     pub struct Socket {
-        /// By number of the channel; none for bytes that only this program reads.
+        /// By number of the channel; none where nothing is told.
         channels: Vec<Option<Arc<RawChannel>>>,
         address: SocketAddr,
         /// The server knows it, and through it the channels, for as long as it is here.
@@ -32,11 +37,17 @@ mod socket {
         ///
         /// # Errors
         /// Nothing can be listened to there.
-        pub fn start(bind: SocketAddr) -> Result<Self> {
+        pub fn start(bind: SocketAddr) -> Outcome<Self> {
+            Self::serve(bind).map_err(Failure::of_server)
+        }
+
+        fn serve(bind: SocketAddr) -> Result<Self> {
             let context = Context::new();
             let mut channels = Vec::new();
-            for channel in Channel::all() {
-                let raw = channel.schema()?.map(|(name, schema)| {
+            for (channel, schema) in Channel::with_schemas()? {
+                // Simulated when a run has ended, for its file.
+                let told = schema.filter(|_| channel != Channel::Rope);
+                let raw = told.map(|(name, schema)| {
                     ChannelBuilder::new(channel.topic())
                         .context(&context)
                         .message_encoding("json")
@@ -49,8 +60,14 @@ mod socket {
                 .context(&context)
                 .name("wag")
                 .capabilities([])
+                .message_backlog_size(BACKLOG)
                 .bind(bind.ip().to_string(), bind.port())
                 .start_blocking()
+                .map_err(|error| match error {
+                    // Told as what it is, so that an address that there is not can be told apart.
+                    FoxgloveError::Bind(error) => anyhow::Error::from(error),
+                    error => error.into(),
+                })
                 .with_context(|| format!("cannot serve Foxglove at {bind}"))?;
             let address = SocketAddr::new(bind.ip(), server.port());
             Ok(Self {
@@ -84,20 +101,26 @@ mod socket {
             }
             Ok(())
         }
+
+        fn begin_anew(&mut self) {
+            if let Some(server) = &self.server {
+                server.clear_session(None);
+            }
+        }
     }
 
     impl Drop for Socket {
         fn drop(&mut self) {
-            if let Some(server) = self.server.take() {
-                server.stop().wait_blocking();
-            }
+            // Not waited for: a client that takes nothing in could make it last for ever.
+            drop(self.server.take().map(WebSocketServerHandle::stop));
         }
     }
 }
 
 #[cfg(not(feature = "foxglove"))]
 mod socket {
-    use anyhow::{Result, bail};
+    use anyhow::Result;
+    use cli_output::{Outcome, bad_input};
     use run_log::{Channel, Sink};
     use serde_json::Value;
     use std::convert::Infallible;
@@ -112,11 +135,11 @@ mod socket {
         ///
         /// # Errors
         /// How a build that can is made.
-        pub fn start(_bind: SocketAddr) -> Result<Self> {
-            bail!(
+        pub fn start(_bind: SocketAddr) -> Outcome<Self> {
+            Err(bad_input!(
                 "this build has no socket for Foxglove; build it with `cargo build --release -p \
                  wag --features foxglove` (the Debian package has it)"
-            )
+            ))
         }
 
         /// Never called.

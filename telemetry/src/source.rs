@@ -1,7 +1,8 @@
 //! Whichever controller is wanted, attached to as long as it runs.
 
 use anyhow::Result;
-use run_log::{CellHere, Feed, Sink};
+use cli_output::eprintln;
+use run_log::{CellHere, Feed, LatestResults, Sink};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use viewer::live::{Joined, Wanted, newest_domain};
@@ -20,6 +21,8 @@ const PICTURES_AT_ONCE: usize = 1;
 struct Attached {
     feed: Feed,
     joined: Joined,
+    /// The process of the controller that was there last.
+    controller: Option<u32>,
 }
 
 /// The messages of the run that is wanted.
@@ -31,6 +34,10 @@ pub struct Source {
     attached: Option<Attached>,
     searched: Option<Instant>,
     told: Option<Instant>,
+    /// Results of the run that is told, and after its end of the one that was.
+    results: Option<LatestResults>,
+    /// Why nothing could be attached to, as it was said last.
+    said: String,
 }
 
 impl Source {
@@ -45,6 +52,8 @@ impl Source {
             attached: None,
             searched: None,
             told: None,
+            results: None,
+            said: String::new(),
         };
         if let Wanted::Domain(domain, _) = &source.wanted {
             source.attached = Some(source.attach(&domain.clone())?);
@@ -58,24 +67,54 @@ impl Source {
         joined.bus().remove_leftovers();
         let pole = self.here.of_run(None).pole;
         let feed = Feed::open(joined.bus(), pole, PICTURES_HZ)?;
-        Ok(Attached { feed, joined })
+        Ok(Attached {
+            feed,
+            joined,
+            controller: None,
+        })
     }
 
-    /// Hands what has arrived to the sink. What cannot be read any more is attached to anew.
+    /// Hands what has arrived to the sink. A run that has ended is let go, and so is a connection
+    /// that fails: what is wanted is attached to anew as soon as it is there.
     ///
     /// # Errors
     /// Those of the sink.
     pub fn turn(&mut self, sink: &mut impl Sink) -> Result<()> {
         let search = due(&mut self.searched, SEARCH);
         if self.attached.is_none() && search {
-            let domain = match &self.wanted {
-                Wanted::Newest => newest_domain(),
-                Wanted::Domain(domain, _) => Some(domain.clone()),
-            };
-            // One that ends between the two looks is no loss.
-            self.attached = domain.and_then(|domain| self.attach(&domain).ok());
-            self.told = None;
+            self.search();
         }
+        if let Err(reason) = self.follow(search, sink) {
+            self.say(format!("{reason:#}"));
+            self.attached = None;
+        }
+        if due(&mut self.told, TELL_AGAIN) {
+            self.tell_again(sink)?;
+        }
+        Ok(())
+    }
+
+    fn search(&mut self) {
+        let domain = match &self.wanted {
+            Wanted::Newest => newest_domain(),
+            Wanted::Domain(domain, _) => Some(domain.clone()),
+        };
+        match domain.map(|domain| self.attach(&domain)).transpose() {
+            Ok(attached) => self.attached = attached,
+            Err(reason) => self.say(format!("{reason:#}")),
+        }
+    }
+
+    /// Says a reason once.
+    fn say(&mut self, reason: String) {
+        if self.said != reason {
+            eprintln!("warning: not attached: {reason}");
+            self.said = reason;
+        }
+    }
+
+    /// Looks for the controller, and hands on what has arrived.
+    fn follow(&mut self, search: bool, sink: &mut impl Sink) -> Result<()> {
         let run = match &self.wanted {
             Wanted::Domain(_, run) => run.as_deref(),
             Wanted::Newest => None,
@@ -83,31 +122,43 @@ impl Source {
         let Some(attached) = &mut self.attached else {
             return Ok(());
         };
-        let runs = attached.joined.has_controller(search, run);
-        attached.feed.turn(PICTURES_AT_ONCE, sink)?;
-        if !runs {
-            if search && self.wanted == Wanted::Newest {
-                self.attached = None;
-            }
-            return Ok(());
+        let there = attached.joined.has_controller(search, run);
+        let now = attached.joined.pid().filter(|_| there);
+        let ended = attached.controller.is_some() && now.is_none();
+        if now.is_some() && now != attached.controller {
+            let facts = attached.joined.facts();
+            let cell = facts.and_then(|facts| facts.cell);
+            let folder = facts.and_then(|facts| facts.folder.as_deref());
+            self.results = folder.map(LatestResults::of);
+            attached.feed.set_pole(self.here.of_run(cell).pole);
+            attached.feed.begin_anew();
+            sink.begin_anew();
+            self.told = None;
         }
-        if due(&mut self.told, TELL_AGAIN)
+        attached.controller = now;
+        attached.feed.turn(PICTURES_AT_ONCE, sink)?;
+        if ended && self.wanted == Wanted::Newest {
+            self.attached = None;
+        }
+        Ok(())
+    }
+
+    /// Tells what does not change, and the results, which are written until after the run's end.
+    fn tell_again(&mut self, sink: &mut impl Sink) -> Result<()> {
+        if let Some(attached) = &mut self.attached
             && let Some(facts) = attached.joined.facts()
         {
             attached.feed.set_pole(self.here.of_run(facts.cell).pole);
             let (target_m, camera) = (facts.target_m(), facts.camera.as_ref());
             attached.feed.scene(target_m, camera, sink)?;
-            if let Some(folder) = &facts.folder {
-                attached.feed.results(folder, sink)?;
-            }
         }
-        Ok(())
+        let mut results = self.results.iter_mut();
+        results.try_for_each(|results| results.tell(sink))
     }
 
     /// Folder of the run that is told, where it is known.
     pub fn run(&self) -> Option<&Path> {
-        let facts = self.attached.as_ref()?.joined.facts()?;
-        facts.folder.as_deref()
+        self.results.as_ref().map(LatestResults::folder)
     }
 }
 

@@ -81,20 +81,18 @@ impl Channel {
         Self::ALL[self as usize].1
     }
 
-    /// All of them.
-    pub fn all() -> impl Iterator<Item = Self> {
-        Self::ALL.into_iter().map(|(channel, ..)| channel)
-    }
-
-    /// Name and JSON schema of its messages; none for bytes that only this program reads.
+    /// All of them, each with name and JSON schema of its messages; none for bytes that only this
+    /// program reads.
     ///
     /// # Errors
     /// The schemas cannot be read, which is a flaw of this program.
-    pub fn schema(self) -> Result<Option<(&'static str, String)>> {
-        let Some(name) = Self::ALL[self as usize].2 else {
-            return Ok(None);
-        };
-        Ok(Some((name, Schemas::read()?.schema(name).to_string())))
+    pub fn with_schemas() -> Result<Vec<(Self, Option<(&'static str, String)>)>> {
+        let schemas = Schemas::read()?;
+        let schema = |name: &'static str| (name, schemas.schema(name).to_string());
+        let all = Self::ALL.into_iter();
+        Ok(all
+            .map(|(channel, _, name)| (channel, name.map(schema)))
+            .collect())
     }
 
     /// The channel of a topic.

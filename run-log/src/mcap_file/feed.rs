@@ -8,7 +8,6 @@ use super::clock::{Clock, Thinned};
 use super::counts::{Gaps, RecordingCounts};
 use super::image::left_jpeg;
 use super::messages::{self, Level};
-use super::results::Results;
 use super::scene::{arm_frames, calibration, camera_place, room};
 use crate::explanation::is_orderly_end;
 use anyhow::{Context, Result};
@@ -20,7 +19,6 @@ use shared_types::ipc::{
     FrameSubscriber, JointReport, JointSubscriber, KeypointSubscriber,
 };
 use shared_types::{FaultCode, StereoCamera};
-use std::path::Path;
 
 /// As much as waits for a subscriber at most.
 const BUFFER: usize = 1024;
@@ -53,6 +51,9 @@ pub trait Sink {
     /// It can take nothing any more.
     fn message(&mut self, channel: Channel, at_ns: u64, message: &Value) -> Result<()>;
 
+    /// Another run begins; what was told of the one before holds no longer.
+    fn begin_anew(&mut self) {}
+
     /// Takes a chunk of the exact recording, which only this program reads.
     ///
     /// # Errors
@@ -65,7 +66,8 @@ pub trait Sink {
 /// Connections to everything worth telling.
 #[derive(Debug)]
 pub(super) struct Ports {
-    chunks: ChunkSubscriber,
+    /// None for those who only look on: the rest can be made from it, which takes its time.
+    chunks: Option<ChunkSubscriber>,
     cycles: CycleSubscriber,
     joints: JointSubscriber,
     keypoints: KeypointSubscriber,
@@ -73,9 +75,9 @@ pub(super) struct Ports {
 }
 
 impl Ports {
-    fn open(bus: &Bus) -> Result<Self> {
+    fn open(bus: &Bus, exact: bool) -> Result<Self> {
         Ok(Self {
-            chunks: bus.chunk_subscriber()?,
+            chunks: exact.then(|| bus.chunk_subscriber()).transpose()?,
             cycles: bus.cycle_subscriber()?,
             joints: bus.joint_subscriber()?,
             keypoints: bus.keypoint_subscriber()?,
@@ -107,14 +109,24 @@ pub struct Feed {
 }
 
 impl Feed {
-    /// Subscribes to everything in a domain, whether anybody publishes there yet or not. Of
-    /// pictures there are `pictures_hz` at most; links are placed for an arm with this pole.
+    /// Subscribes to what those who look on are told in a domain, whether anybody publishes there
+    /// yet or not. Of pictures there are `pictures_hz` at most; links are placed for an arm with
+    /// this pole.
     ///
     /// # Errors
     /// Shared memory has no place for one more that listens.
     pub fn open(bus: &Bus, pole: Pole, pictures_hz: f64) -> Result<Self> {
+        Self::of(Ports::open(bus, false)?, pole, pictures_hz)
+    }
+
+    /// The same with the exact recording, and the causes of stops that it tells.
+    pub(super) fn with_recording(bus: &Bus, pole: Pole, pictures_hz: f64) -> Result<Self> {
+        Self::of(Ports::open(bus, true)?, pole, pictures_hz)
+    }
+
+    fn of(ports: Ports, pole: Pole, pictures_hz: f64) -> Result<Self> {
         Ok(Self {
-            ports: Ports::open(bus)?,
+            ports,
             told: Told {
                 counts: RecordingCounts::default(),
                 clock: Clock::compare(),
@@ -128,6 +140,11 @@ impl Feed {
                 cycles: Gaps::default(),
             },
         })
+    }
+
+    /// Another controller begins: mode and fault are told anew.
+    pub fn begin_anew(&mut self) {
+        (self.told.mode, self.told.fault) = (None, 0);
     }
 
     /// Links are placed for an arm with this pole from now on.
@@ -159,14 +176,6 @@ impl Feed {
         )
     }
 
-    /// Tells the results that lie in a run's folder: plan, identified rope, figures.
-    ///
-    /// # Errors
-    /// Those of the sink.
-    pub fn results(&self, run: &Path, sink: &mut impl Sink) -> Result<()> {
-        Results::of(run).look(sink, self.told.clock)
-    }
-
     /// Hands what has arrived to the sink; of the camera's frames as many as `pictures`.
     ///
     /// # Errors
@@ -179,10 +188,9 @@ impl Feed {
     fn drain(&mut self, sink: &mut impl Sink) -> Result<()> {
         let Self { ports, told } = self;
         // The exact recording first: the rest can be made from it.
-        each(
-            || Ok(ports.chunks.receive()?),
-            |chunk| told.chunk(&chunk, sink),
-        )?;
+        if let Some(chunks) = &ports.chunks {
+            each(|| Ok(chunks.receive()?), |chunk| told.chunk(&chunk, sink))?;
+        }
         each(
             || Ok(ports.cycles.receive()?),
             |cycle| told.cycle(&cycle, sink),
@@ -194,6 +202,9 @@ impl Feed {
         each(
             || Ok(ports.keypoints.receive()?),
             |frame| {
+                if !sink.wants(Channel::Keypoints) {
+                    return Ok(());
+                }
                 let at_ns = told.clock.wall_ns(frame.stamp_ns);
                 let message = messages::keypoints(at_ns, &frame);
                 sink.message(Channel::Keypoints, at_ns, &message)
@@ -250,6 +261,9 @@ pub(super) struct Told {
 
 /// Tells a line of the log.
 fn log(sink: &mut impl Sink, at_ns: u64, level: Level, text: &str) -> Result<()> {
+    if !sink.wants(Channel::Log) {
+        return Ok(());
+    }
     let message = messages::log(at_ns, level, text);
     sink.message(Channel::Log, at_ns, &message)
 }

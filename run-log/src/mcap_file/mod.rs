@@ -31,6 +31,6 @@ pub use image::left_jpeg;
 pub(crate) use read::{Walked, is_mcap, messages, replay_bytes, walk};
 pub use recorder::{Recorded, RecorderConfig, run as record};
 pub use recover::{Recovered, recover};
-pub use results::{RopeMotion, SimulateRope};
+pub use results::{LatestResults, RopeMotion, SimulateRope};
 pub use thread::RunFileThread;
 pub use writer::McapFile;

@@ -80,7 +80,7 @@ impl Recording {
         // Connected before the file appears, which tells the parent that nothing is missed from
         // here on.
         let pole = config.cell.pole;
-        let feed = Feed::open(bus, pole, config.pictures_hz)?;
+        let feed = Feed::with_recording(bus, pole, config.pictures_hz)?;
         let clock = feed.told().clock();
         let mut file = McapFile::create(&config.file)?;
         file.metadata(

@@ -12,6 +12,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 use shared_types::MonotonicNs;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// Every second frame of the report's 60 Hz.
 const ROPE_EVERY: usize = 2;
@@ -62,13 +63,9 @@ impl Results {
                 continue;
             }
             *taken = true;
-            match read(&path) {
-                Ok(value) => {
-                    let at_ns = clock.now_ns();
-                    let message = json!({ "timestamp": time(at_ns), field: value });
-                    sink.message(channel, at_ns, &message)?;
-                }
-                Err(reason) => tracing::warn!("a result is left out: {reason:#}"),
+            if let Some(value) = read_or_warn(&path) {
+                let at_ns = clock.now_ns();
+                sink.message(channel, at_ns, &message(at_ns, field, &value))?;
             }
         }
         Ok(())
@@ -97,6 +94,62 @@ impl Results {
         }
         Ok(())
     }
+}
+
+/// Results of a run's folder as they are now, for those who come late.
+#[derive(Debug)]
+pub struct LatestResults {
+    run: PathBuf,
+    /// When each file was written that was read last, and what it holds; nothing where it cannot
+    /// be read.
+    kept: [Option<(SystemTime, Option<Value>)>; FILES.len()],
+}
+
+impl LatestResults {
+    /// Those of `run`.
+    pub fn of(run: &Path) -> Self {
+        Self {
+            run: run.to_owned(),
+            kept: [const { None }; FILES.len()],
+        }
+    }
+
+    /// The run's folder.
+    pub fn folder(&self) -> &Path {
+        &self.run
+    }
+
+    /// Tells all that there are: plan, identified rope, figures.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn tell(&mut self, sink: &mut impl Sink) -> Result<()> {
+        let at_ns = Clock::compare().now_ns();
+        for ((name, channel, field), kept) in FILES.into_iter().zip(&mut self.kept) {
+            let path = self.run.join(name);
+            let written = path.metadata().and_then(|m| m.modified()).ok();
+            let Some(written) = written.filter(|_| sink.wants(channel)) else {
+                continue;
+            };
+            if kept.as_ref().is_none_or(|(at, _)| *at != written) {
+                *kept = Some((written, read_or_warn(&path)));
+            }
+            if let Some((_, Some(value))) = kept {
+                sink.message(channel, at_ns, &message(at_ns, field, value))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn message(at_ns: u64, field: &str, value: &Value) -> Value {
+    json!({ "timestamp": time(at_ns), field: value })
+}
+
+fn read_or_warn(path: &Path) -> Option<Value> {
+    let read = read(path);
+    read.map_err(|reason| tracing::warn!("a result is left out: {reason:#}"))
+        .ok()
 }
 
 /// A JSON or TOML file as JSON.

@@ -63,8 +63,8 @@ impl McapFile {
         let fail = || format!("cannot write `{}`", path.display());
         let mut writer = options().create(file).with_context(fail)?;
         let mut ids = Vec::new();
-        for channel in Channel::all() {
-            let (schema_id, encoding) = match channel.schema()? {
+        for (channel, schema) in Channel::with_schemas()? {
+            let (schema_id, encoding) = match schema {
                 Some((name, text)) => {
                     let id = writer.add_schema(name, "jsonschema", text.as_bytes())?;
                     (id, "json")

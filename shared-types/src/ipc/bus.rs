@@ -65,10 +65,11 @@ const JOINTS: Topic = (JOINT_SERVICE, 1024, 2);
 const CHUNKS: Topic = ("wag/v1/controller/recording", 128, 1);
 
 /// The run that a record belongs to, its recorder, a page that looks on, the one that works
-/// on frames or previews them, and a recorder that joined late, with its exact recording.
-const SUBSCRIBERS: usize = 6;
+/// on frames, the one that previews them, a recorder that joined late, a program that tells
+/// others, and one more.
+const SUBSCRIBERS: usize = 8;
 /// Processes that have opened a service.
-const NODES: usize = 10;
+const NODES: usize = 16;
 
 /// One process's connection to a shared-memory domain.
 ///

@@ -14,6 +14,8 @@ use std::time::{Duration, Instant};
 
 /// A state that has not changed for this long is no state any more.
 const SILENCE: Duration = Duration::from_secs(1);
+/// Within this time a controller makes several cycles.
+const BEAT: Duration = Duration::from_millis(50);
 /// An operator that has not beaten for this long is none.
 const OPERATOR_SILENCE: Duration = Duration::from_secs(1);
 
@@ -86,6 +88,17 @@ impl Controller {
         })
     }
 
+    /// Whether it has not ended: its process is there, or its cycles go on. A blackboard is there
+    /// for as long as somebody reads it, also when its controller is not.
+    fn lives(&mut self) -> bool {
+        let state = self.state.get();
+        if Path::new(&format!("/proc/{}", state.pid)).exists() {
+            return true;
+        }
+        std::thread::sleep(BEAT);
+        self.state.get().cycle != state.cycle
+    }
+
     fn look(&mut self) -> Seen {
         let state = self.state.get();
         let alive = self.cycle.beats(state.cycle, SILENCE);
@@ -139,6 +152,12 @@ impl Joined {
         there
     }
 
+    /// The process of the controller.
+    pub fn pid(&self) -> Option<u32> {
+        let controller = self.controller.as_ref()?;
+        Some(controller.state.get().pid)
+    }
+
     /// What the folder of the controller's run tells.
     pub fn facts(&self) -> Option<&Facts> {
         self.controller.as_ref().map(|controller| &controller.facts)
@@ -146,7 +165,8 @@ impl Joined {
 
     fn look(&mut self, search: bool, run: Option<&Path>) -> Option<Seen> {
         if self.controller.is_none() && search {
-            self.controller = Controller::open(&self.bus, run).ok();
+            let found = Controller::open(&self.bus, run).ok();
+            self.controller = found.and_then(|mut found| found.lives().then_some(found));
         }
         let seen = self.controller.as_mut()?.look();
         let gone = !seen.alive && !Path::new(&format!("/proc/{}", seen.state.pid)).exists();
@@ -261,6 +281,7 @@ mod tests {
         boards.publish(state);
         assert!(attached.look(false, None).is_none());
         assert!(attached.joined.controller.is_none());
+        assert!(attached.look(true, None).is_none(), "only its blackboard");
     }
 
     #[test]

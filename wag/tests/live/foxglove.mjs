@@ -27,12 +27,17 @@ client.on("advertise", (channels) => {
     seen.channels[topic] = { encoding, schemaName, schemaEncoding, title: JSON.parse(schema).title };
     subscribed.set(client.subscribe(id), topic);
   }
-  client.advertise({ topic: "/stop", encoding: "json", schemaName: "" });
+  const stop = client.advertise({ topic: "/stop", encoding: "json", schemaName: "" });
+  client.sendMessage(stop, new TextEncoder().encode("{}"));
+  client.setParameters([{ name: "speed", value: 1 }]);
 });
 client.on("message", ({ subscriptionId, timestamp, data }) => {
   const topic = subscribed.get(subscriptionId);
   const message = JSON.parse(new TextDecoder().decode(data));
   seen.counts[topic] = (seen.counts[topic] ?? 0) + 1;
+  if (Object.keys(seen.messages).length === 0) {
+    console.error("it tells");
+  }
   if (!(topic in seen.messages)) {
     seen.messages[topic] = { timestamp: timestamp.toString(), message };
   }

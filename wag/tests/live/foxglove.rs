@@ -1,11 +1,15 @@
 //! The socket for Foxglove, as Foxglove's own client meets it.
 
+use super::client::Watch;
 use super::fake::{Fake, run_folder};
 use super::support::{Running, alone, missing};
 use rustix::process::Signal;
 use serde_json::Value;
+use std::io::{BufRead, BufReader};
+use std::net::TcpStream;
 use std::process::{Command, Stdio};
 use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 const CLIENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/live/foxglove.mjs");
 /// What comes of a controller with a camera and an identified rope.
@@ -23,6 +27,19 @@ fn client(url: &str, topics: &[&str]) -> Command {
     let mut client = Command::new("node");
     client.arg(CLIENT).arg(url).args(topics);
     client
+}
+
+/// A client that is killed in the middle of what it is told.
+fn killed_while_it_is_told(url: &str) {
+    let mut client = client(url, &["/never"]);
+    let client = client.stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut client = client.spawn().unwrap();
+    let mut said = String::new();
+    let mut stderr = BufReader::new(client.stderr.take().unwrap());
+    stderr.read_line(&mut said).unwrap();
+    assert_eq!(said, "it tells\n");
+    client.kill().unwrap();
+    client.wait().unwrap();
 }
 
 /// Runs the client until it has seen these topics.
@@ -48,14 +65,17 @@ fn foxglove_sees_all_topics_with_their_schemas_and_can_do_nothing() {
         std::fs::copy(format!("{camera}.{from}"), folder.path().join(to)).unwrap();
     }
     let run = folder.path().display();
-    let (mut watch, reported) = Running::start(&format!("watch {run} --foxglove 127.0.0.1:0"));
+    let (mut watch, reported) = Running::start(&format!("watch {run} --foxglove=127.0.0.1:0"));
     let url = reported["foxglove"].as_str().unwrap();
     let seen = seen(url, &TOPICS);
     assert_eq!(seen["server"]["name"], "wag");
     assert_eq!(seen["server"]["capabilities"], serde_json::json!([]));
     let channels = seen["channels"].as_object().unwrap();
-    // All but the exact recording.
-    assert_eq!(channels.len(), run_log::Channel::all().count() - 1);
+    // All but the exact recording and the rope, which is simulated for the file.
+    assert_eq!(
+        channels.len(),
+        run_log::Channel::with_schemas().unwrap().len() - 2
+    );
     for (topic, channel) in channels {
         assert_eq!(channel["encoding"], "json", "{topic}");
         assert_eq!(channel["schemaEncoding"], "jsonschema", "{topic}");
@@ -74,8 +94,12 @@ fn foxglove_sees_all_topics_with_their_schemas_and_can_do_nothing() {
     let [sec, nsec] = ["sec", "nsec"].map(|part| told[part].as_u64().unwrap());
     let under = seen["messages"]["/arm/measured"]["timestamp"].as_str();
     assert_eq!(under.unwrap(), (sec * 1_000_000_000 + nsec).to_string());
-    // It was refused to publish, and nothing came of it.
-    assert!(!seen["statuses"].as_array().unwrap().is_empty(), "{seen}");
+    // It was refused to publish and to set anything, and nothing came of it.
+    let refused = seen["statuses"].to_string();
+    assert!(
+        refused.contains("clientPublish") && refused.contains("parameters"),
+        "{refused}"
+    );
     let wires = &fake.wires;
     let asked = [&wires.stops, &wires.disarms].map(|n| n.load(Ordering::SeqCst));
     assert_eq!(asked, [0, 0]);
@@ -89,23 +113,55 @@ fn clients_and_sockets_that_are_killed_leave_nothing_in_the_way() {
         return;
     }
     let fake = Fake::start(&format!("foxglove-kill-{}", std::process::id()));
-    let options = format!("watch --domain {} --foxglove 127.0.0.1:0", fake.domain);
+    let options = format!("watch --domain {} --foxglove=127.0.0.1:0", fake.domain);
     let topics = ["/arm/measured", "/camera/left/image"];
     // More than may listen at once.
     for _ in 0..8 {
         let (mut watch, reported) = Running::start(&options);
         let url = reported["foxglove"].as_str().unwrap();
         seen(url, &topics);
-        let mut killed = client(url, &["/never"])
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
-        killed.kill().unwrap();
-        killed.wait().unwrap();
+        killed_while_it_is_told(url);
         seen(url, &topics);
         watch.kill();
     }
     let (mut watch, reported) = Running::start(&options);
     seen(reported["foxglove"].as_str().unwrap(), &topics);
     assert_eq!(watch.end(Signal::INT).0, Some(0));
+}
+
+#[test]
+fn what_begins_again_is_told_again_and_nobody_holds_the_end_up() {
+    let _alone = alone();
+    if missing::named("WAG_NODE_MODULES", "folder of Node modules").is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let domain = format!("foxglove-again-{}", std::process::id());
+    let fake = Fake::start(&domain);
+    run_folder(folder.path(), &domain);
+    let run = folder.path().display();
+    // Two that look on: neither keeps alive what the other lets go.
+    let page = Watch::start(&run.to_string());
+    let (mut watch, reported) = Running::start(&format!("watch {run} --foxglove=127.0.0.1:0"));
+    let url = reported["foxglove"].as_str().unwrap();
+    let topics = ["/controller/cycles", "/arm/measured", "/scene"];
+    seen(url, &topics);
+    drop(fake);
+    // Its figures come when it has ended, and are told all the same.
+    std::fs::write(folder.path().join("summary.json"), "{\"ok\": true}").unwrap();
+    assert_eq!(
+        seen(url, &["/wag/summary"])["messages"]["/wag/summary"]["message"]["summary"]["ok"],
+        true
+    );
+    // As long as one that looks on takes to let go.
+    std::thread::sleep(Duration::from_secs(2));
+    let again = Fake::start(&domain);
+    seen(url, &topics);
+    drop(again);
+    // One that is connected and says nothing.
+    let idle = TcpStream::connect(url.trim_start_matches("ws://")).unwrap();
+    let began = Instant::now();
+    assert_eq!(watch.end(Signal::INT).0, Some(0));
+    assert!(began.elapsed() < Duration::from_secs(5));
+    drop((idle, page));
 }
