@@ -3,9 +3,11 @@
 
 During one run of each pair, a program that looks on is started, let look for a moment and killed,
 over and over; during the other there is none. Which comes first alternates. Cycles that the
-controller missed are counted in the whole run and in the throw.
+controller missed are counted in the whole run and in the throw. With `--client`, one that looks on
+counts when its client was told cycles and frames. Nothing else of this program may run meanwhile.
 
-    python3 benches/live/attach.py --wag target/release/wag --pairs 5 --seed 1 -- --foxglove=127.0.0.1:0
+    python3 benches/live/attach.py --wag target/release/wag --pairs 5 --seed 1 \\
+        --client wag/tests/live/foxglove.mjs -- --foxglove=127.0.0.1:0
 
 Prints one line of JSON per run, and a summary. Python's standard library only.
 """
@@ -19,32 +21,35 @@ import sys
 import tempfile
 import time
 
-# How long one looks on before it is killed (s).
+# How long one without a client looks on before it is killed (s).
 LOOK_S = 0.4
 # Pause before the next (s).
 PAUSE_S = 0.2
 
 
 def look_on(wag, options, client):
-    """One that looks on comes and is killed, with its client."""
-    line = [wag, "watch", "--json", *options]
-    watch = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    attached = client_process = None
+    """One that looks on comes, is seen to work, and is killed; whether it was."""
+    command = [wag, "watch", "--json", *options]
+    watch = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     text = ""
     for line in watch.stdout:
         text += line
         if line == "}\n":
-            attached = json.loads(text)
             break
-    if attached is not None and client is not None and "foxglove" in attached:
-        command = ["node", client, attached["foxglove"], "/never"]
-        client_process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    time.sleep(LOOK_S)
-    for process in (watch, client_process):
-        if process is not None:
-            process.kill()
-            process.wait()
-    return attached is not None
+    works = watch.poll() is None
+    try:
+        if client is not None:
+            told = json.loads(text)["foxglove"]
+            command = ["node", client, told, "/controller/cycles", "/tf"]
+            seen = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=5)
+            works = seen.returncode == 0
+        else:
+            time.sleep(LOOK_S)
+    except subprocess.TimeoutExpired:
+        works = False
+    watch.kill()
+    watch.wait()
+    return works
 
 
 def missed_cycles(wag, run):
@@ -67,12 +72,13 @@ def run(wag, seed, options, client, folder):
             continue
         attached += look_on(wag, options, client)
         time.sleep(PAUSE_S)
+    if demo.returncode != 0:
+        return None
     summary = json.loads((folder / "run" / "summary.json").read_text())
     missed, cycles = missed_cycles(wag, out)
     return {
         "seed": seed,
         "attached": attached,
-        "exit_code": demo.returncode,
         "cycles": cycles,
         "missed": missed,
         "throw_missed": summary.get("latency", {}).get("missed"),
@@ -96,6 +102,8 @@ def main():
                 options = args.options if is_watched else None
                 seen = run(args.wag, args.seed + pair, options, args.client, pathlib.Path(folder))
             print(json.dumps(seen), flush=True)
+            if seen is None:
+                sys.exit("a demo failed: this pair counts for nothing")
             sums[is_watched] = [
                 a + b
                 for a, b in zip(sums[is_watched], [seen["missed"], seen["cycles"], seen["throw_missed"] or 0, seen["attached"]])
