@@ -106,7 +106,7 @@ pub fn start(json: bool, verbose: u8) {
     // What others say of their own insides helps nobody but who looks for everything.
     let others = match verbose {
         0 | 1 => {
-            ",iceoryx2=error,foxglove=off,tract_onnx=error,calib_targets_charuco=error,calib_targets_chessboard=error"
+            ",iceoryx2=error,foxglove=off,rustdds=error,tract_onnx=error,calib_targets_charuco=error,calib_targets_chessboard=error"
         }
         _ => "",
     };

@@ -21,7 +21,7 @@ mod foxglove;
 mod lerobot;
 mod npz;
 mod recorded;
-mod ros2;
+pub mod ros2;
 mod written;
 
 pub use command::{ExportArgs, ExportCommand, LerobotArgs};

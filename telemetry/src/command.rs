@@ -1,8 +1,9 @@
-//! `wag watch --foxglove`, as it is typed and run.
+//! `wag watch --foxglove` and `--ros2`, as they are typed and run.
 
 use crate::foxglove::Socket;
+use crate::ros2::Publisher;
 use crate::source::Source;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use cli_output::{OrInput, Outcome, is_interrupted, output, println};
 use run_log::{CellHere, Channel, Sink};
@@ -32,14 +33,34 @@ pub struct TelemetryArgs {
         conflicts_with_all = ["bind", "preview", "camera"]
     )]
     pub foxglove: Option<SocketAddr>,
+    /// Instead of the page, a publisher for ROS 2 in this DDS domain, with the topics of
+    /// `wag export ros2`; default: ROS_DOMAIN_ID, or 0. Whoever is in the same network can look on,
+    /// without encryption, and nothing more. In builds with `--features ros2` only.
+    #[arg(
+        long,
+        value_name = "DOMAIN",
+        require_equals = true,
+        conflicts_with_all = ["bind", "preview", "camera"]
+    )]
+    pub ros2: Option<Option<u32>>,
 }
 
 impl TelemetryArgs {
     /// Whether anybody is to be told anything.
     #[must_use]
     pub fn is_wanted(&self) -> bool {
-        self.foxglove.is_some()
+        self.foxglove.is_some() || self.ros2.is_some()
     }
+}
+
+/// The domain that ROS's own programs join where none is given.
+fn ros_domain() -> Result<u32> {
+    let Some(text) = std::env::var_os("ROS_DOMAIN_ID").filter(|text| !text.is_empty()) else {
+        return Ok(0);
+    };
+    let text = text.to_string_lossy();
+    text.parse()
+        .with_context(|| format!("ROS_DOMAIN_ID is `{text}`, which is no domain's number"))
 }
 
 /// All sinks of a command.
@@ -86,6 +107,12 @@ pub fn run(
         if !bind.ip().is_loopback() {
             eprintln!("warning: whoever reaches {} can look on", bind.ip());
         }
+    }
+    if let Some(domain) = args.ros2 {
+        let domain = domain.map_or_else(ros_domain, Ok).or_input()?;
+        sinks.0.push(Box::new(Publisher::start(domain).or_input()?));
+        println!("topics of ROS 2 in DDS domain {domain}; Ctrl-C ends it.");
+        report["ros2"] = json!({ "domain": domain });
     }
     output::object(&report);
     let (began, span_s) = (Instant::now(), seconds.unwrap_or(f64::INFINITY));

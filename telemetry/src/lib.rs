@@ -7,9 +7,11 @@
 
 mod command;
 mod foxglove;
+mod ros2;
 mod source;
 
 pub use command::{TelemetryArgs, run};
 pub use foxglove::Socket;
+pub use ros2::Publisher;
 pub use run_log::Sink;
 pub use source::Source;

@@ -1,12 +1,11 @@
 //! A bag of rosbag2: a folder with one MCAP file and what is in it.
 
-use super::definitions::Definition;
-use super::messages::cdr;
+use super::topics::{Promise, Topic};
+use super::translation::Messages;
 use anyhow::{Context, Result};
 use mcap::records::{MessageHeader, Statistics};
 use mcap::{Compression, WriteOptions, Writer};
 use run_log::files;
-use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
@@ -21,20 +20,15 @@ pub(super) const MARK: &str = "# Written by `wag export ros2`.\n";
 /// The version of the metadata that ROS 2 Humble writes; every later one reads it.
 const VERSION: u32 = 5;
 
-/// A topic.
-#[derive(Debug)]
-pub(super) struct Topic {
-    /// Its name.
-    pub(super) name: &'static str,
-    /// What its messages are.
-    pub(super) definition: &'static Definition,
-    /// Whether late subscribers get the last message (transient local): for what is sent once.
-    pub(super) is_latched: bool,
-}
-
-/// Reliable, to whoever comes late too (`TRANSIENT_LOCAL`); numbers as Humble writes them.
-const LATCHED: &str = "- history: 1
-  depth: 1
+/// What whoever plays the bag promises: nothing is the default, which is reliable. Otherwise
+/// reliable, to whoever comes late too (`TRANSIENT_LOCAL`); numbers as Humble writes them.
+fn quality_of_service(topic: &Topic) -> String {
+    let Promise::Latched { depth } = topic.promise else {
+        return String::new();
+    };
+    format!(
+        "- history: 1
+  depth: {depth}
   reliability: 1
   durability: 1
   deadline:
@@ -48,13 +42,8 @@ const LATCHED: &str = "- history: 1
     sec: 9223372036
     nsec: 854775807
   avoid_ros_namespace_conventions: false
-";
-
-impl Topic {
-    /// Nothing is the default.
-    fn quality_of_service(&self) -> &'static str {
-        if self.is_latched { LATCHED } else { "" }
-    }
+"
+    )
 }
 
 /// What a topic has been given in the file.
@@ -92,19 +81,7 @@ impl Bag {
         self.is_failed
     }
 
-    /// Adds a message of the instant `at_ns` (wall clock).
-    pub(super) fn add(
-        &mut self,
-        topic: &'static Topic,
-        at_ns: u64,
-        message: &impl Serialize,
-    ) -> Result<()> {
-        let added = self.write(topic, at_ns, message);
-        self.is_failed |= added.is_err();
-        added
-    }
-
-    fn write(&mut self, topic: &'static Topic, at_ns: u64, message: &impl Serialize) -> Result<()> {
+    fn write(&mut self, topic: &'static Topic, at_ns: u64, message: &[u8]) -> Result<()> {
         if !self.channels.contains_key(topic.name) {
             let channel = self.channel(topic)?;
             self.channels.insert(topic.name, channel);
@@ -118,8 +95,7 @@ impl Bag {
             publish_time: at_ns,
         };
         channel.messages += 1;
-        self.writer
-            .write_to_known_channel(&header, &cdr(message)?)?;
+        self.writer.write_to_known_channel(&header, message)?;
         Ok(())
     }
 
@@ -127,7 +103,7 @@ impl Bag {
         let name = topic.definition.full_name();
         let text = topic.definition.text();
         let schema = self.writer.add_schema(&name, "ros2msg", text.as_bytes())?;
-        let quality = topic.quality_of_service().to_owned();
+        let quality = quality_of_service(topic);
         let metadata = [("offered_qos_profiles".to_owned(), quality)].into();
         Ok(Channel {
             topic,
@@ -156,6 +132,14 @@ impl Bag {
     }
 }
 
+impl Messages for Bag {
+    fn add(&mut self, topic: &'static Topic, at_ns: u64, message: Vec<u8>) -> Result<()> {
+        let added = self.write(topic, at_ns, &message);
+        self.is_failed |= added.is_err();
+        added
+    }
+}
+
 /// The text of [`METADATA`].
 fn metadata<'a>(found: &Statistics, channels: impl Iterator<Item = &'a Channel>) -> Result<String> {
     let (begin_ns, count) = (found.message_start_time, found.message_count);
@@ -164,7 +148,7 @@ fn metadata<'a>(found: &Statistics, channels: impl Iterator<Item = &'a Channel>)
     for channel in channels {
         let topic = channel.topic;
         // A text of JSON is one of YAML.
-        let quality = serde_json::to_string(topic.quality_of_service())?;
+        let quality = serde_json::to_string(&quality_of_service(topic))?;
         topics.push_str(&format!(
             "    - topic_metadata:
         name: {}

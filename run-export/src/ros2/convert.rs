@@ -7,7 +7,8 @@ use super::messages::{
 use anyhow::{Context, Result, anyhow, ensure};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
+use serde_json::Error;
 
 /// `ImageMarker.POINTS`.
 const POINTS: i32 = 4;
@@ -83,10 +84,15 @@ struct Line {
     name: String,
 }
 
+/// A message: the text of a file, or a value.
+pub(super) trait Json<'de>: Deserializer<'de, Error = Error> {}
+
+impl<'de, D: Deserializer<'de, Error = Error>> Json<'de> for D {}
+
 /// Joints; an angle or a speed that the arm did not tell is no number, and where it told no
 /// speed at all there are none.
-pub(super) fn joints(at_ns: u64, data: &[u8]) -> Result<JointState> {
-    let Joints { joints } = serde_json::from_slice(data)?;
+pub(super) fn joints<'de>(at_ns: u64, data: impl Json<'de>) -> Result<JointState> {
+    let Joints { joints } = Joints::deserialize(data)?;
     let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
     let has_speed = joints.iter().any(|joint| joint.velocity.is_some());
     let speeds = joints.iter().filter(|_| has_speed);
@@ -100,8 +106,8 @@ pub(super) fn joints(at_ns: u64, data: &[u8]) -> Result<JointState> {
 }
 
 /// Transforms between frames.
-pub(super) fn transforms(at_ns: u64, data: &[u8]) -> Result<Vec<TransformStamped>> {
-    let Frames { transforms } = serde_json::from_slice(data)?;
+pub(super) fn transforms<'de>(at_ns: u64, data: impl Json<'de>) -> Result<Vec<TransformStamped>> {
+    let Frames { transforms } = Frames::deserialize(data)?;
     let stamped = |frame: Frame| {
         Ok(TransformStamped {
             header: header(at_ns, &frame.parent_frame_id)?,
@@ -116,8 +122,8 @@ pub(super) fn transforms(at_ns: u64, data: &[u8]) -> Result<Vec<TransformStamped
 }
 
 /// A picture.
-pub(super) fn picture(at_ns: u64, data: &[u8]) -> Result<CompressedImage> {
-    let picture: Picture = serde_json::from_slice(data)?;
+pub(super) fn picture<'de>(at_ns: u64, data: impl Json<'de>) -> Result<CompressedImage> {
+    let picture = Picture::deserialize(data)?;
     let format = picture.format;
     ensure!(format == "jpeg", "a picture is `{format}`, not jpeg");
     Ok(CompressedImage {
@@ -130,8 +136,8 @@ pub(super) fn picture(at_ns: u64, data: &[u8]) -> Result<CompressedImage> {
 }
 
 /// How the camera sees.
-pub(super) fn calibration(data: &[u8]) -> Result<Calibration> {
-    Ok(serde_json::from_slice(data)?)
+pub(super) fn calibration<'de>(data: impl Json<'de>) -> Result<Calibration> {
+    Ok(Calibration::deserialize(data)?)
 }
 
 impl Calibration {
@@ -155,8 +161,12 @@ impl Calibration {
 
 /// The rope's keypoints in the picture of this time, clamp first, lead last; none where it was
 /// lost.
-pub(super) fn keypoints(at_ns: u64, frame_id: &str, data: &[u8]) -> Result<ImageMarker> {
-    let Drawn { points } = serde_json::from_slice(data)?;
+pub(super) fn keypoints<'de>(
+    at_ns: u64,
+    frame_id: &str,
+    data: impl Json<'de>,
+) -> Result<ImageMarker> {
+    let Drawn { points } = Drawn::deserialize(data)?;
     // The same points are drawn a second time, as a line.
     let drawn = points.into_iter().next();
     let drawn = drawn.context("nothing is drawn in it")?;
@@ -183,8 +193,8 @@ pub(super) fn keypoints(at_ns: u64, frame_id: &str, data: &[u8]) -> Result<Image
 }
 
 /// A line of the log.
-pub(super) fn log(at_ns: u64, data: &[u8]) -> Result<Log> {
-    let line: Line = serde_json::from_slice(data)?;
+pub(super) fn log<'de>(at_ns: u64, data: impl Json<'de>) -> Result<Log> {
+    let line = Line::deserialize(data)?;
     Ok(Log {
         stamp: Time::of(at_ns)?,
         level: line.level.saturating_mul(LEVEL),

@@ -6,7 +6,7 @@
 
 /// A type: its name, what is in it, and the types named there, theirs included.
 #[derive(Debug)]
-pub(super) struct Definition {
+pub struct Definition {
     package: &'static str,
     name: &'static str,
     fields: &'static str,
@@ -19,7 +19,8 @@ const BETWEEN: &str =
 
 impl Definition {
     /// Full name: `sensor_msgs/msg/JointState`.
-    pub(super) fn full_name(&self) -> String {
+    #[must_use]
+    pub fn full_name(&self) -> String {
         format!("{}/msg/{}", self.package, self.name)
     }
 

@@ -49,7 +49,8 @@ pub enum RecordCommand {
     wag watch runs/NAME             a run that is under way\n  \
     wag watch --domain cell-1       a controller or camera that runs as a daemon\n  \
     wag watch --preview             with the rope's keypoints as the frames come\n  \
-    wag watch --foxglove            for the application Foxglove, at ws://127.0.0.1:8765\n\n\
+    wag watch --foxglove            for the application Foxglove, at ws://127.0.0.1:8765\n  \
+    wag watch --ros2                for ROS 2, over DDS\n\n\
     The address it prints holds a secret: whoever knows it can look on and stop the arm.\n\
     From another machine: ssh -L PORT:127.0.0.1:PORT HOST, then the same address.")]
 pub struct WatchArgs {
