@@ -2,7 +2,7 @@
 
 use crate::{Write, csv, foxglove, lerobot, npz, ros2};
 use clap::{Args, Subcommand};
-use cli_output::{Outcome, output, println};
+use cli_output::{OrInput, Outcome, output, println, watch_interrupts};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -54,6 +54,8 @@ impl ExportCommand {
     /// # Errors
     /// The run cannot be read, or lacks what the format needs, or the export cannot be written.
     pub fn run(&self) -> Outcome<Value> {
+        // Half a folder does not stay behind.
+        watch_interrupts().or_failed()?;
         let of_run = |args: &ExportArgs, write: Write| write(&args.run, args.out.as_deref());
         let (format, written) = match self {
             Self::Csv(args) => ("csv", of_run(args, csv)),

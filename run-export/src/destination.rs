@@ -2,6 +2,7 @@
 //! export.
 
 use anyhow::{Context, Result, anyhow, ensure};
+use cli_output::is_interrupted;
 use shared_types::file_error::why;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -41,9 +42,16 @@ impl Destination {
         self.building.path()
     }
 
+    /// Fails where the command was interrupted: what was built goes by itself.
+    pub(crate) fn go_on() -> Result<()> {
+        ensure!(!is_interrupted(), "interrupted: nothing was written");
+        Ok(())
+    }
+
     /// Puts it in its place. Between the two renames nothing is there; where the second fails, the
     /// earlier export comes back.
     pub(crate) fn put(self) -> Result<()> {
+        Self::go_on()?;
         let fail = || format!("cannot write `{}`", self.folder.display());
         let aside = temporary(&self.folder)?;
         let earlier = aside.path().join("earlier");

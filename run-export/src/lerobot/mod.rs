@@ -45,6 +45,7 @@ pub fn lerobot(runs: &[PathBuf], out: &Path, fps: Option<u32>) -> Outcome<Writte
     let destination = Destination::new(out, set::is_set).or_input()?;
     let mut set = set::Set::new(destination.building().to_owned());
     for run in runs {
+        Destination::go_on().or_failed()?;
         let episode = episode::Episode::read(run, fps)?;
         set.check(&episode).or_input()?;
         set.add(&episode).or_failed()?;
