@@ -3,8 +3,10 @@
 
 use anyhow::{Context, Result, anyhow, ensure};
 use cli_output::is_interrupted;
+use run_log::files;
 use shared_types::file_error::why;
-use std::fs;
+use std::fs::{self, File};
+use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -66,8 +68,41 @@ impl Destination {
     }
 }
 
+/// Looks at a file that is to be written: there is nothing yet, or an earlier export, which begins
+/// with `magic` and is no run's own recording.
+///
+/// # Errors
+/// There is something else, or nothing can be written there.
+pub(crate) fn check_file(path: &Path, magic: &[u8]) -> Result<()> {
+    let name = path.display();
+    if let Ok(real) = path.canonicalize()
+        && real.is_file()
+    {
+        let mut begin = Vec::new();
+        let read = File::open(&real).and_then(|file| {
+            let mut begins = file.take(magic.len() as u64);
+            begins.read_to_end(&mut begin)
+        });
+        let is_export = read.is_ok() && begin == magic;
+        ensure!(
+            is_export && real.file_name() != Some(files::RUN.as_ref()),
+            "`{name}` is there and is no earlier export, so it is not replaced: name another file \
+             with --out"
+        );
+    }
+    make_parent(path)?;
+    files::check_writable(path)
+}
+
+/// Makes the folder that something is to lie in.
+fn make_parent(path: &Path) -> Result<()> {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    parent.map_or(Ok(()), files::create_folder)
+}
+
 /// A folder of its own beside `folder`. The library's error tells a name that nobody knows.
 fn temporary(folder: &Path) -> Result<TempDir> {
+    make_parent(folder)?;
     let parent = folder.parent().filter(|p| !p.as_os_str().is_empty());
     let mut builder = tempfile::Builder::new();
     let builder = builder
@@ -116,7 +151,26 @@ mod tests {
         assert!(refused.contains("no earlier export"), "{refused}");
         assert_eq!(fs::read_to_string(to.join("mark")).unwrap(), "second");
         assert_eq!(held(), 1);
-        let nowhere = export(&place.path().join("none/export"), "first").unwrap_err();
-        assert!(nowhere.to_string().contains("none/export"), "{nowhere}");
+        export(&place.path().join("none/export"), "first").unwrap();
+        let nowhere = export(&to.join("mark/export"), "first").unwrap_err();
+        assert!(nowhere.to_string().contains("mark"), "{nowhere}");
+    }
+
+    #[test]
+    fn a_file_that_is_no_earlier_export_stays() {
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        check_file(&at("new/run.npz"), b"PK").unwrap();
+        for (name, words) in [
+            ("mine.txt", "words"),
+            (files::RUN, "PK, a recording"),
+            ("empty", ""),
+        ] {
+            fs::write(at(name), words).unwrap();
+            let refused = check_file(&at(name), b"PK").unwrap_err().to_string();
+            assert!(refused.contains("no earlier export"), "{refused}");
+        }
+        fs::write(at("run.npz"), "PK of before").unwrap();
+        check_file(&at("run.npz"), b"PK").unwrap();
     }
 }

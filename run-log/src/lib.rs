@@ -51,8 +51,9 @@ pub use earlier::Earlier;
 pub use explanation::{Explanation, Late, LimitExceeded, Row, Stop, explain};
 pub use margins::Margin;
 pub use mcap_file::{
-    Channel, Feed, LatestResults, McapFile, Recorded, RecorderConfig, RecordingCounts, Recovered,
-    RopeMotion, RunFileThread, RunFilm, RunPart, SimulateRope, Sink, left_jpeg, record, recover,
+    Channel, Feed, LatestResults, McapFile, NamedSchema, Recorded, RecorderConfig, RecordingCounts,
+    Recovered, RopeMotion, RunFileThread, RunFilm, RunPart, SimulateRope, Sink, StandingScene,
+    left_jpeg, record, recover,
 };
 pub use page::show;
 pub use run::{CellHere, NoRecording, Recording, Run};

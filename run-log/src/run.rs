@@ -90,11 +90,6 @@ impl Run {
         &self.folder
     }
 
-    /// The run's file: pictures and messages, where it has any.
-    pub fn file_path(&self) -> &Path {
-        &self.film
-    }
-
     /// The exact recording; [`NoRecording`] where there is none.
     pub fn recording(&self) -> Result<Recording> {
         let path = self.recorded.clone();

@@ -30,6 +30,7 @@ pub struct TelemetryArgs {
         num_args = 0..=1,
         require_equals = true,
         default_missing_value = "127.0.0.1:8765",
+        value_parser = address,
         conflicts_with_all = ["bind", "preview", "camera"]
     )]
     pub foxglove: Option<SocketAddr>,
@@ -51,6 +52,14 @@ impl TelemetryArgs {
     pub fn is_wanted(&self) -> bool {
         self.foxglove.is_some() || self.ros2.is_some()
     }
+}
+
+/// An address with its port, or a port of this machine alone.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let port = text.strip_prefix("localhost:").unwrap_or(text);
+    let here = |port: u16| SocketAddr::from(([127, 0, 0, 1], port));
+    let address = port.parse().map(here).ok().or_else(|| text.parse().ok());
+    address.ok_or_else(|| "give ADDR:PORT or PORT, such as 127.0.0.1:8765 or 8765".to_owned())
 }
 
 /// The domain that ROS's own programs join where none is given.
@@ -120,7 +129,7 @@ pub fn run(
     while !is_interrupted() && began.elapsed().as_secs_f64() < span_s {
         source.turn(&mut sinks).or_failed()?;
         if let Some(run) = source.run().filter(|run| named.as_deref() != Some(*run)) {
-            eprintln!("run `{}` is told", run.display());
+            eprintln!("run `{}` is shown", run.display());
             named = Some(run.to_owned());
         }
         std::thread::sleep(TURN);

@@ -68,7 +68,7 @@ mod socket {
                     FoxgloveError::Bind(error) => anyhow::Error::from(error),
                     error => error.into(),
                 })
-                .with_context(|| format!("cannot serve Foxglove at {bind}"))?;
+                .with_context(|| format!("cannot serve Foxglove at {bind}; name another place with --foxglove=ADDR:PORT"))?;
             let address = SocketAddr::new(bind.ip(), server.port());
             Ok(Self {
                 channels,

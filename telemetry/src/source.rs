@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use cli_output::eprintln;
-use run_log::{CellHere, Feed, LatestResults, Sink};
+use run_log::{CellHere, Feed, LatestResults, Sink, StandingScene};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use viewer::live::{Joined, Wanted, newest_domain};
@@ -34,7 +34,8 @@ pub struct Source {
     attached: Option<Attached>,
     searched: Option<Instant>,
     told: Option<Instant>,
-    /// Results of the run that is told, and after its end of the one that was.
+    /// Scene and results of the run that is told, and after its end of the one that was.
+    scene: Option<StandingScene>,
     results: Option<LatestResults>,
     /// Why nothing could be attached to, as it was said last.
     said: String,
@@ -52,6 +53,7 @@ impl Source {
             attached: None,
             searched: None,
             told: None,
+            scene: None,
             results: None,
             said: String::new(),
         };
@@ -126,17 +128,30 @@ impl Source {
         let now = attached.joined.pid().filter(|_| there);
         let ended = attached.controller.is_some() && now.is_none();
         if now.is_some() && now != attached.controller {
-            let facts = attached.joined.facts();
-            let cell = facts.and_then(|facts| facts.cell);
-            let folder = facts.and_then(|facts| facts.folder.as_deref());
+            let folder = attached.joined.facts().and_then(|f| f.folder.as_deref());
             self.results = folder.map(LatestResults::of);
-            attached.feed.set_pole(self.here.of_run(cell).pole);
             attached.feed.begin_anew();
             sink.begin_anew();
             self.told = None;
         }
         attached.controller = now;
+        if let Some(facts) = attached
+            .joined
+            .facts()
+            .filter(|_| search || self.told.is_none())
+        {
+            let scene = StandingScene {
+                pole: self.here.of_run(facts.cell).pole,
+                target_m: facts.target_m(),
+                camera: facts.camera.clone(),
+            };
+            attached.feed.set_pole(scene.pole);
+            self.scene = Some(scene);
+        }
         attached.feed.turn(PICTURES_AT_ONCE, sink)?;
+        if ended {
+            eprintln!("the run has ended; what begins next is shown as soon as it does");
+        }
         if ended && self.wanted == Wanted::Newest {
             self.attached = None;
         }
@@ -145,12 +160,8 @@ impl Source {
 
     /// Tells what does not change, and the results, which are written until after the run's end.
     fn tell_again(&mut self, sink: &mut impl Sink) -> Result<()> {
-        if let Some(attached) = &mut self.attached
-            && let Some(facts) = attached.joined.facts()
-        {
-            attached.feed.set_pole(self.here.of_run(facts.cell).pole);
-            let (target_m, camera) = (facts.target_m(), facts.camera.as_ref());
-            attached.feed.scene(target_m, camera, sink)?;
+        if let Some(scene) = &self.scene {
+            scene.tell(sink)?;
         }
         let mut results = self.results.iter_mut();
         results.try_for_each(|results| results.tell(sink))

@@ -21,9 +21,10 @@ use std::path::Path;
 ///
 /// # Errors
 /// The run has no `run.mcap`, or one with a message that is not as this program writes it, or
-/// none of a type of Foxglove's; `out` is `run.mcap` itself, or cannot be written.
+/// none of a type of Foxglove's; `out` is a file that is no earlier export, or cannot be written.
 #[cfg(feature = "foxglove")]
 pub fn foxglove(run: &Path, out: Option<&Path>) -> Outcome<Written> {
+    use crate::destination::check_file;
     use crate::written::WrittenFile;
     use cli_output::{OrInput, bad_input};
     use run_log::{Run, files};
@@ -34,14 +35,7 @@ pub fn foxglove(run: &Path, out: Option<&Path>) -> Outcome<Written> {
 
     let opened = Run::open(run).or_input()?;
     let path = out.map_or_else(|| opened.folder().join(FILE), Path::to_owned);
-    let same = |other: &Path| path.canonicalize().ok() == other.canonicalize().ok();
-    if path.exists() && same(opened.file_path()) {
-        let name = path.display();
-        return Err(bad_input!(
-            "`{name}` is the run's recording, which is not replaced: name another file with --out"
-        ));
-    }
-    files::check_writable(&path).or_input()?;
+    check_file(&path, mcap::MAGIC).or_input()?;
     let mut file = file::FoxgloveFile::new().or_failed()?;
     let mut missing = opened.records(|record| file.add(record)).or_input()?;
     let (messages, converted) = file.counts();

@@ -40,9 +40,18 @@ use std::path::{Path, PathBuf};
 #[cfg(feature = "lerobot")]
 pub fn lerobot(runs: &[PathBuf], out: &Path, fps: Option<u32>) -> Outcome<Written> {
     use crate::destination::Destination;
-    use cli_output::OrInput;
+    use cli_output::{OrInput, bad_input};
 
     let destination = Destination::new(out, set::is_set).or_input()?;
+    for (index, run) in runs.iter().enumerate() {
+        let same = |other: &PathBuf| run.canonicalize().ok() == other.canonicalize().ok();
+        if runs.iter().take(index).any(same) {
+            return Err(bad_input!(
+                "`{}` is named twice: each run is one episode",
+                run.display()
+            ));
+        }
+    }
     let mut set = set::Set::new(destination.building().to_owned());
     for run in runs {
         Destination::go_on().or_failed()?;

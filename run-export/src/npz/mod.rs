@@ -3,6 +3,7 @@
 
 mod file;
 
+use crate::destination::check_file;
 use crate::recorded::RecordedRun;
 use crate::written::{Written, WrittenFile};
 use anyhow::Result;
@@ -15,6 +16,8 @@ use shared_types::rope::RANGES;
 use shared_types::{KeypointTrack, Plan, RopeParams};
 use std::path::Path;
 
+/// How archives of arrays begin.
+const ZIP: &[u8] = b"PK\x03\x04";
 /// Name of the file, where none is given.
 const FILE: &str = "run.npz";
 
@@ -29,7 +32,7 @@ const FILE: &str = "run.npz";
 pub fn npz(run: &Path, out: Option<&Path>) -> Outcome<Written> {
     let recorded = RecordedRun::read(run)?;
     let path = out.map_or_else(|| recorded.run.folder().join(FILE), Path::to_owned);
-    files::check_writable(&path).or_input()?;
+    check_file(&path, ZIP).or_input()?;
     let keypoints = recorded.run.keypoints().or_input()?;
     let plan = recorded.run.plan().or_input()?;
     let rope = recorded.run.rope().or_input()?;

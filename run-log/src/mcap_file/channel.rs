@@ -36,6 +36,9 @@ pub enum Channel {
     Summary,
 }
 
+/// A schema's name, and itself as JSON.
+pub type NamedSchema = (&'static str, String);
+
 impl Channel {
     /// All of them in the order of their numbers, each with its topic and the schema of its
     /// messages; none for bytes that only this program reads.
@@ -86,7 +89,7 @@ impl Channel {
     ///
     /// # Errors
     /// The schemas cannot be read, which is a flaw of this program.
-    pub fn with_schemas() -> Result<Vec<(Self, Option<(&'static str, String)>)>> {
+    pub fn with_schemas() -> Result<Vec<(Self, Option<NamedSchema>)>> {
         let schemas = Schemas::read()?;
         let schema = |name: &'static str| (name, schemas.schema(name).to_string());
         let all = Self::ALL.into_iter();

@@ -63,6 +63,40 @@ pub trait Sink {
     }
 }
 
+/// What does not move in a run.
+#[derive(Debug, Clone, Default)]
+pub struct StandingScene {
+    /// The arm's pole.
+    pub pole: Pole,
+    /// The target (m, world frame), where there is one.
+    pub target_m: Option<[f64; 3]>,
+    /// The camera, where there is one.
+    pub camera: Option<StereoCamera>,
+}
+
+impl StandingScene {
+    /// Tells it: arm, pole and target, and the camera's calibration and pose.
+    ///
+    /// # Errors
+    /// Those of the sink.
+    pub fn tell(&self, sink: &mut impl Sink) -> Result<()> {
+        let at_ns = Clock::compare().now_ns();
+        let mut tell = |channel, message: &dyn Fn() -> Value| match sink.wants(channel) {
+            true => sink.message(channel, at_ns, &message()),
+            false => Ok(()),
+        };
+        tell(Channel::Scene, &|| room(at_ns, &self.pole, self.target_m))?;
+        let Some(camera) = &self.camera else {
+            return Ok(());
+        };
+        tell(Channel::Calibration, &|| calibration(at_ns, camera))?;
+        tell(
+            Channel::Frames,
+            &|| json!({ "transforms": [camera_place(at_ns, camera)] }),
+        )
+    }
+}
+
 /// Connections to everything worth telling.
 #[derive(Debug)]
 pub(super) struct Ports {
@@ -150,30 +184,6 @@ impl Feed {
     /// Links are placed for an arm with this pole from now on.
     pub fn set_pole(&mut self, pole: Pole) {
         self.told.pole = pole;
-    }
-
-    /// Tells what does not move: arm, pole and target, and the camera's calibration and pose.
-    ///
-    /// # Errors
-    /// Those of the sink.
-    pub fn scene(
-        &self,
-        target_m: Option<[f64; 3]>,
-        camera: Option<&StereoCamera>,
-        sink: &mut impl Sink,
-    ) -> Result<()> {
-        let at_ns = self.told.clock.now_ns();
-        let mut tell = |channel, message: &dyn Fn() -> Value| match sink.wants(channel) {
-            true => sink.message(channel, at_ns, &message()),
-            false => Ok(()),
-        };
-        tell(Channel::Scene, &|| room(at_ns, &self.told.pole, target_m))?;
-        let Some(camera) = camera else { return Ok(()) };
-        tell(Channel::Calibration, &|| calibration(at_ns, camera))?;
-        tell(
-            Channel::Frames,
-            &|| json!({ "transforms": [camera_place(at_ns, camera)] }),
-        )
     }
 
     /// Hands what has arrived to the sink; of the camera's frames as many as `pictures`.

@@ -22,9 +22,9 @@ mod thread;
 mod urdf;
 mod writer;
 
-pub use channel::Channel;
+pub use channel::{Channel, NamedSchema};
 pub use counts::RecordingCounts;
-pub use feed::{Feed, Sink};
+pub use feed::{Feed, Sink, StandingScene};
 pub(crate) use film::GAP_NS;
 pub use film::{RunFilm, RunPart};
 pub use image::left_jpeg;

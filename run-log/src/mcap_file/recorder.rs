@@ -2,7 +2,7 @@
 //! the file when it is told to end or its parent is gone.
 
 use super::counts::RecordingCounts;
-use super::feed::{FRAMES_AT_ONCE, Feed, Told};
+use super::feed::{FRAMES_AT_ONCE, Feed, StandingScene, Told};
 use super::film::{AHEAD, CAMERA};
 use super::results::{Results, SimulateRope};
 use super::urdf::urdf;
@@ -103,7 +103,12 @@ impl Recording {
             let text = serde_json::to_string(camera)?;
             file.metadata(CAMERA[0], &[(CAMERA[1], text)])?;
         }
-        feed.scene(config.target_m, config.camera.as_ref(), &mut file)?;
+        let scene = StandingScene {
+            pole,
+            target_m: config.target_m,
+            camera: config.camera.clone(),
+        };
+        scene.tell(&mut file)?;
         Ok(Self { file, feed })
     }
 
