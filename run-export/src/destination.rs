@@ -68,22 +68,22 @@ impl Destination {
     }
 }
 
-/// Looks at a file that is to be written: there is nothing yet, or an earlier export, which begins
-/// with `magic` and is no run's own recording.
+/// So many bytes of a file tell whether it is an earlier export.
+const BEGIN: u64 = 64;
+
+/// Looks at a file that is to be written: there is nothing yet, or an earlier export, which
+/// `is_export` knows by how it begins, and which is no run's own recording.
 ///
 /// # Errors
 /// There is something else, or nothing can be written there.
-pub(crate) fn check_file(path: &Path, magic: &[u8]) -> Result<()> {
+pub(crate) fn check_file(path: &Path, is_export: fn(&[u8]) -> bool) -> Result<()> {
     let name = path.display();
     if let Ok(real) = path.canonicalize()
         && real.is_file()
     {
         let mut begin = Vec::new();
-        let read = File::open(&real).and_then(|file| {
-            let mut begins = file.take(magic.len() as u64);
-            begins.read_to_end(&mut begin)
-        });
-        let is_export = read.is_ok() && begin == magic;
+        let read = File::open(&real).and_then(|file| file.take(BEGIN).read_to_end(&mut begin));
+        let is_export = read.is_ok() && is_export(&begin);
         ensure!(
             is_export && real.file_name() != Some(files::RUN.as_ref()),
             "`{name}` is there and is no earlier export, so it is not replaced: name another file \
@@ -92,6 +92,12 @@ pub(crate) fn check_file(path: &Path, magic: &[u8]) -> Result<()> {
     }
     make_parent(path)?;
     files::check_writable(path)
+}
+
+/// Writes a file, unless the command was interrupted.
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    Destination::go_on()?;
+    files::write_atomic(path, bytes)
 }
 
 /// Makes the folder that something is to lie in.
@@ -160,17 +166,18 @@ mod tests {
     fn a_file_that_is_no_earlier_export_stays() {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
-        check_file(&at("new/run.npz"), b"PK").unwrap();
+        let is_export: fn(&[u8]) -> bool = |begin| begin.starts_with(b"PK");
+        check_file(&at("new/run.npz"), is_export).unwrap();
         for (name, words) in [
             ("mine.txt", "words"),
             (files::RUN, "PK, a recording"),
             ("empty", ""),
         ] {
             fs::write(at(name), words).unwrap();
-            let refused = check_file(&at(name), b"PK").unwrap_err().to_string();
+            let refused = check_file(&at(name), is_export).unwrap_err().to_string();
             assert!(refused.contains("no earlier export"), "{refused}");
         }
         fs::write(at("run.npz"), "PK of before").unwrap();
-        check_file(&at("run.npz"), b"PK").unwrap();
+        check_file(&at("run.npz"), is_export).unwrap();
     }
 }

@@ -1,9 +1,9 @@
 //! `wag watch --foxglove` and `--ros2`, as they are typed and run.
 
 use crate::foxglove::Socket;
-use crate::ros2::Publisher;
+use crate::ros2::{Domain, Publisher};
 use crate::source::Source;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use cli_output::{OrInput, Outcome, is_interrupted, output, println};
 use run_log::{CellHere, Channel, Sink};
@@ -62,31 +62,35 @@ fn address(text: &str) -> Result<SocketAddr, String> {
     address.ok_or_else(|| "give ADDR:PORT or PORT, such as 127.0.0.1:8765 or 8765".to_owned())
 }
 
-/// The domain that ROS's own programs join where none is given.
-fn ros_domain() -> Result<u32> {
-    let Some(text) = std::env::var_os("ROS_DOMAIN_ID").filter(|text| !text.is_empty()) else {
-        return Ok(0);
-    };
-    let text = text.to_string_lossy();
-    text.parse()
-        .with_context(|| format!("ROS_DOMAIN_ID is `{text}`, which is no domain's number"))
+/// All sinks of a command. One that fails is told nothing more, and ends the command.
+struct Sinks {
+    sinks: Vec<Box<dyn Sink>>,
+    failed: Option<anyhow::Error>,
 }
 
-/// All sinks of a command.
-struct Sinks(Vec<Box<dyn Sink>>);
+impl Sinks {
+    fn each(&mut self, tell: impl Fn(&mut dyn Sink) -> Result<()>) {
+        let failed = &mut self.failed;
+        self.sinks.retain_mut(|sink| {
+            let told = tell(sink.as_mut());
+            told.map_err(|error| *failed = Some(error)).is_ok()
+        });
+    }
+}
 
 impl Sink for Sinks {
     fn wants(&self, channel: Channel) -> bool {
-        self.0.iter().any(|sink| sink.wants(channel))
+        self.sinks.iter().any(|sink| sink.wants(channel))
     }
 
     fn message(&mut self, channel: Channel, at_ns: u64, message: &Value) -> Result<()> {
-        let mut sinks = self.0.iter_mut();
-        sinks.try_for_each(|sink| sink.message(channel, at_ns, message))
+        self.each(|sink| sink.message(channel, at_ns, message));
+        Ok(())
     }
 
-    fn begin_anew(&mut self) {
-        self.0.iter_mut().for_each(|sink| sink.begin_anew());
+    fn begin_anew(&mut self) -> Result<()> {
+        self.each(|sink| sink.begin_anew());
+        Ok(())
     }
 }
 
@@ -103,12 +107,20 @@ pub fn run(
     // Whatever happens here may wait; what is told of may not. Threads have what the one that starts
     // them has.
     let _ = rustix::process::nice(NICE);
-    let mut sinks = Sinks(Vec::new());
+    let domain = args.ros2.map(Domain::of).transpose().or_input()?;
+    let mut sinks = Sinks {
+        sinks: Vec::new(),
+        failed: None,
+    };
     let mut report = json!({ "ok": true, "command": "watch" });
     if let Some(bind) = args.foxglove {
         let socket = Socket::start(bind)?;
         report["foxglove"] = socket.url().into();
-        sinks.0.push(Box::new(socket));
+        sinks.sinks.push(Box::new(socket));
+    }
+    if let Some(domain) = domain {
+        sinks.sinks.push(Box::new(Publisher::start(domain)?));
+        report["ros2"] = json!({ "domain": domain.id, "is_local": domain.is_local });
     }
     let mut source = Source::new(wanted, here).or_input()?;
     if let (Some(bind), Some(url)) = (args.foxglove, report["foxglove"].as_str()) {
@@ -117,17 +129,20 @@ pub fn run(
             eprintln!("warning: whoever reaches {} can look on", bind.ip());
         }
     }
-    if let Some(domain) = args.ros2 {
-        let domain = domain.map_or_else(ros_domain, Ok).or_input()?;
-        sinks.0.push(Box::new(Publisher::start(domain).or_input()?));
-        println!("topics of ROS 2 in DDS domain {domain}; Ctrl-C ends it.");
-        report["ros2"] = json!({ "domain": domain });
+    if let Some(Domain { id, is_local }) = domain {
+        println!("topics of ROS 2 in DDS domain {id}; Ctrl-C ends it.");
+        if !is_local {
+            eprintln!("warning: whoever is in this network can look on");
+        }
     }
     output::object(&report);
     let (began, span_s) = (Instant::now(), seconds.unwrap_or(f64::INFINITY));
     let mut named = None;
     while !is_interrupted() && began.elapsed().as_secs_f64() < span_s {
         source.turn(&mut sinks).or_failed()?;
+        if let Some(failed) = sinks.failed.take() {
+            return Err(failed).or_failed();
+        }
         if let Some(run) = source.run().filter(|run| named.as_deref() != Some(*run)) {
             eprintln!("run `{}` is shown", run.display());
             named = Some(run.to_owned());

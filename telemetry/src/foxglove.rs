@@ -102,10 +102,11 @@ mod socket {
             Ok(())
         }
 
-        fn begin_anew(&mut self) {
+        fn begin_anew(&mut self) -> Result<()> {
             if let Some(server) = &self.server {
                 server.clear_session(None);
             }
+            Ok(())
         }
     }
 

@@ -12,6 +12,6 @@ mod source;
 
 pub use command::{TelemetryArgs, run};
 pub use foxglove::Socket;
-pub use ros2::Publisher;
+pub use ros2::{Domain, Publisher};
 pub use run_log::Sink;
 pub use source::Source;

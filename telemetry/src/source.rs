@@ -131,7 +131,7 @@ impl Source {
             let folder = attached.joined.facts().and_then(|f| f.folder.as_deref());
             self.results = folder.map(LatestResults::of);
             attached.feed.begin_anew();
-            sink.begin_anew();
+            sink.begin_anew()?;
             self.told = None;
         }
         attached.controller = now;

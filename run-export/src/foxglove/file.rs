@@ -1,6 +1,7 @@
 //! The file that is written, record by record of the run's.
 
 use super::encoding::{Encoding, of_schema};
+use crate::destination::Destination;
 use anyhow::{Context, Result};
 use mcap::records::{self, MessageHeader, Record, SchemaHeader};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
@@ -26,6 +27,16 @@ pub(super) struct FoxgloveFile {
     channels: BTreeMap<u16, Channel>,
 }
 
+/// Whether a file begins as an export does: a header without a profile, written by this program.
+pub(super) fn is_export(begin: &[u8]) -> bool {
+    // Behind the magic the record's kind, its length, no profile, and the library's name.
+    let rest = begin
+        .strip_prefix(mcap::MAGIC)
+        .and_then(|rest| rest.get(9..));
+    let name = rest.and_then(|rest| rest.strip_prefix(&[0; 4])?.get(4..));
+    name.is_some_and(|name| name.starts_with(b"wag "))
+}
+
 impl FoxgloveFile {
     /// A file without a record.
     pub(super) fn new() -> Result<Self> {
@@ -45,6 +56,7 @@ impl FoxgloveFile {
     /// # Errors
     /// A message is not as its schema has it.
     pub(super) fn add(&mut self, record: &Record<'_>) -> Result<()> {
+        Destination::go_on()?;
         match record {
             Record::Schema { header, data } => {
                 let schema = (header.clone(), data.to_vec());

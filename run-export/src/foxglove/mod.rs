@@ -24,10 +24,10 @@ use std::path::Path;
 /// none of a type of Foxglove's; `out` is a file that is no earlier export, or cannot be written.
 #[cfg(feature = "foxglove")]
 pub fn foxglove(run: &Path, out: Option<&Path>) -> Outcome<Written> {
-    use crate::destination::check_file;
+    use crate::destination::{check_file, write_file};
     use crate::written::WrittenFile;
     use cli_output::{OrInput, bad_input};
-    use run_log::{Run, files};
+    use run_log::Run;
     use serde_json::json;
 
     /// Name of the file, where none is given.
@@ -35,7 +35,7 @@ pub fn foxglove(run: &Path, out: Option<&Path>) -> Outcome<Written> {
 
     let opened = Run::open(run).or_input()?;
     let path = out.map_or_else(|| opened.folder().join(FILE), Path::to_owned);
-    check_file(&path, mcap::MAGIC).or_input()?;
+    check_file(&path, file::is_export).or_input()?;
     let mut file = file::FoxgloveFile::new().or_failed()?;
     let mut missing = opened.records(|record| file.add(record)).or_input()?;
     let (messages, converted) = file.counts();
@@ -47,7 +47,7 @@ pub fn foxglove(run: &Path, out: Option<&Path>) -> Outcome<Written> {
     }
     missing.extend(file.silent_topics());
     let bytes = file.finish().or_failed()?;
-    files::write_atomic(&path, &bytes).or_failed()?;
+    write_file(&path, &bytes).or_failed()?;
     Ok(Written {
         run: run.to_owned(),
         files: vec![WrittenFile {

@@ -3,7 +3,7 @@
 
 mod file;
 
-use crate::destination::check_file;
+use crate::destination::{check_file, write_file};
 use crate::recorded::RecordedRun;
 use crate::written::{Written, WrittenFile};
 use anyhow::Result;
@@ -16,8 +16,8 @@ use shared_types::rope::RANGES;
 use shared_types::{KeypointTrack, Plan, RopeParams};
 use std::path::Path;
 
-/// How archives of arrays begin.
-const ZIP: &[u8] = b"PK\x03\x04";
+/// The array that stands first, by which an export knows an earlier one.
+const FIRST: &str = "epoch_ns";
 /// Name of the file, where none is given.
 const FILE: &str = "run.npz";
 
@@ -32,7 +32,7 @@ const FILE: &str = "run.npz";
 pub fn npz(run: &Path, out: Option<&Path>) -> Outcome<Written> {
     let recorded = RecordedRun::read(run)?;
     let path = out.map_or_else(|| recorded.run.folder().join(FILE), Path::to_owned);
-    check_file(&path, ZIP).or_input()?;
+    check_file(&path, is_export).or_input()?;
     let keypoints = recorded.run.keypoints().or_input()?;
     let plan = recorded.run.plan().or_input()?;
     let rope = recorded.run.rope().or_input()?;
@@ -47,7 +47,7 @@ pub fn npz(run: &Path, out: Option<&Path>) -> Outcome<Written> {
 
     let mut file = NpzFile::new();
     let put = |file: &mut NpzFile| -> Result<()> {
-        file.scalar("epoch_ns", recorded.epoch_ns)?;
+        file.scalar(FIRST, recorded.epoch_ns)?;
         put_columns(file, "cycles", recorded.cycles.cycle_columns())?;
         put_columns(file, "reports", recorded.cycles.report_columns())?;
         keypoints.iter().try_for_each(|k| put_keypoints(file, k))?;
@@ -56,7 +56,7 @@ pub fn npz(run: &Path, out: Option<&Path>) -> Outcome<Written> {
     };
     put(&mut file).or_failed()?;
     let (bytes, count) = file.finish().or_failed()?;
-    files::write_atomic(&path, &bytes).or_failed()?;
+    write_file(&path, &bytes).or_failed()?;
     Ok(Written {
         run: run.to_owned(),
         files: vec![WrittenFile {
@@ -67,6 +67,14 @@ pub fn npz(run: &Path, out: Option<&Path>) -> Outcome<Written> {
         figures: json!({ "epoch_ns": recorded.epoch_ns, "arrays": count, "bytes": bytes.len() }),
         missing,
     })
+}
+
+/// Whether a file begins as the archive of an export does: a ZIP's header of 30 bytes, then a name.
+fn is_export(begin: &[u8]) -> bool {
+    let name = begin
+        .strip_prefix(b"PK\x03\x04")
+        .and_then(|rest| rest.get(26..));
+    name.is_some_and(|name| name.starts_with(FIRST.as_bytes()))
 }
 
 /// Columns of the same rows under one name.

@@ -8,7 +8,7 @@ mod topics;
 mod translation;
 
 pub use definitions::Definition;
-pub use topics::{ALL, Promise, Topic};
+pub use topics::{ALL, PICTURES, Promise, Topic};
 pub use translation::{Messages, Translation};
 
 use crate::destination::Destination;

@@ -38,11 +38,12 @@ const fn topic(name: &'static str, definition: &'static Definition, promise: Pro
 }
 
 pub(super) static MEASURED: Topic = topic("/joint_states", &JOINT_STATE, Promise::Reliable);
-pub(super) static COMMANDED: Topic = topic("/joint_commands", &JOINT_STATE, Promise::Reliable);
+pub(super) static COMMANDED: Topic = topic("/joint_setpoints", &JOINT_STATE, Promise::Reliable);
 pub(super) static FRAMES: Topic = topic("/tf", &TF, Promise::Reliable);
 /// The camera's pose, which holds for the whole run.
 pub(super) static FIXED_FRAMES: Topic = topic("/tf_static", &TF, Promise::Latched { depth: 1 });
-pub(super) static PICTURES: Topic = topic(
+/// The camera's pictures.
+pub static PICTURES: Topic = topic(
     "/camera/left/image/compressed",
     &COMPRESSED_IMAGE,
     Promise::BestEffort,
@@ -54,7 +55,7 @@ pub(super) static CAMERA: Topic = topic(
 );
 pub(super) static KEYPOINTS: Topic =
     topic("/camera/left/keypoints", &IMAGE_MARKER, Promise::Reliable);
-/// As every node of ROS promises it.
+/// To those who come late, too, as nodes of ROS do.
 pub(super) static LINES: Topic = topic("/rosout", &LOG, Promise::Latched { depth: 100 });
 
 /// All of them.

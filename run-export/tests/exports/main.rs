@@ -91,8 +91,15 @@ fn what_is_no_earlier_export_is_not_replaced_and_nothing_is_left() {
     assert_eq!(names_in(&bag), ["metadata.yaml", "run_0.mcap"]);
     // No file, and no place for one.
     assert!(refused(npz, &run, &bag).contains("it is a folder"));
-    assert!(refused(npz, &run, &place.path().join("none/a.npz")).contains("none/a.npz"));
-    assert_eq!(names_in(place.path()), ["bag", "run"]);
+    let under_a_file = run.join(files::RUN).join("a.npz");
+    assert!(refused(npz, &run, &under_a_file).contains(files::RUN));
+    // The run's own recording, and what others wrote.
+    let before = fs::read(run.join(files::RUN)).unwrap();
+    refused(npz, &run, &run.join(files::RUN));
+    assert!(fs::read(run.join(files::RUN)).unwrap() == before);
+    fs::write(place.path().join("mine.npz"), "PK\u{3}\u{4} of mine").unwrap();
+    refused(npz, &run, &place.path().join("mine.npz"));
+    assert_eq!(names_in(place.path()), ["bag", "mine.npz", "run"]);
 }
 
 #[test]

@@ -52,7 +52,12 @@ pub trait Sink {
     fn message(&mut self, channel: Channel, at_ns: u64, message: &Value) -> Result<()>;
 
     /// Another run begins; what was told of the one before holds no longer.
-    fn begin_anew(&mut self) {}
+    ///
+    /// # Errors
+    /// It can take nothing any more.
+    fn begin_anew(&mut self) -> Result<()> {
+        Ok(())
+    }
 
     /// Takes a chunk of the exact recording, which only this program reads.
     ///

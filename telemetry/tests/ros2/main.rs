@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{JoinHandle, sleep};
 use std::time::{Duration, Instant};
-use telemetry::Publisher;
+use telemetry::{Domain, Publisher};
 
 /// On this machine alone, whatever networks it has and whether they pass on what is for many.
 const LOOPBACK: &str = "<CycloneDDS><Domain><General><Interfaces>\
@@ -34,6 +34,15 @@ const PERIOD: Duration = Duration::from_millis(20);
 /// whoever asks for any.
 fn domain(test: u32) -> u32 {
     1 + (2 * std::process::id() + test) % 100
+}
+
+/// One that only this machine hears: what is told is invented.
+fn published(domain: u32) -> Publisher {
+    let domain = Domain {
+        is_local: true,
+        ..Domain::of(Some(domain)).unwrap()
+    };
+    Publisher::start(domain).unwrap()
 }
 
 /// A run that goes on, told in a thread.
@@ -157,7 +166,7 @@ fn is_as_told(read: &Value) {
     assert_eq!(measured["name"], json!(["joint1", "joint2"]));
     assert_eq!(measured["position"], json!([0.5, 1.5]));
     assert_eq!(measured["velocity"], json!([-0.25, "NaN"]));
-    assert_eq!(topic("joint_commands")["position"], json!([0.75]));
+    assert_eq!(topic("joint_setpoints")["position"], json!([0.75]));
     for (name, child) in [("tf", "link1"), ("tf_static", "camera_left")] {
         let frame = &topic(name)["transforms"][0];
         assert_eq!(frame["header"], header("base"));
@@ -212,7 +221,7 @@ fn offers() -> Value {
             true,
             false
         ),
-        of("joint_commands", joints, true, false),
+        of("joint_setpoints", joints, true, false),
         of("joint_states", joints, true, false),
         of("rosout", "rcl_interfaces::msg::dds_::Log_", true, true),
         of("tf", frames, true, false),
@@ -227,7 +236,7 @@ fn cyclone_dds_reads_every_topic_late_and_after_another_was_killed() {
     };
     let python = python.to_str().unwrap();
     let domain = domain(0);
-    let told = Told::start(Publisher::start(domain).unwrap());
+    let told = Told::start(published(domain));
     let (mut killed, read) = reader(python, domain, "until-killed");
     is_as_told(&read);
     told.longest();
@@ -246,14 +255,14 @@ fn cyclone_dds_reads_every_topic_late_and_after_another_was_killed() {
 
 #[test]
 fn a_domain_that_is_none_is_refused_by_its_number() {
-    let said = Publisher::start(233).unwrap_err().to_string();
+    let said = format!("{:#}", Domain::of(Some(233)).unwrap_err());
     assert!(said.contains("233") && said.contains("0 to 232"), "{said}");
 }
 
 #[test]
 fn a_message_that_is_not_as_a_run_has_it_is_refused() {
-    let mut publisher = Publisher::start(domain(1)).unwrap();
+    let mut publisher = published(domain(1));
     let foreign = publisher.message(Channel::Measured, AT_NS, &json!({ "joints": 7 }));
     assert!(foreign.is_err());
-    assert!(publisher.wants(Channel::Image) && !publisher.wants(Channel::Plan));
+    assert!(publisher.wants(Channel::Measured) && !publisher.wants(Channel::Plan));
 }

@@ -153,7 +153,7 @@ LATCHED = Qos(
 )
 TOPICS = {
     "rt/joint_states": (JointState, DEFAULT),
-    "rt/joint_commands": (JointState, DEFAULT),
+    "rt/joint_setpoints": (JointState, DEFAULT),
     "rt/tf": (TFMessage, DEFAULT),
     "rt/tf_static": (TFMessage, LATCHED),
     "rt/camera/left/image/compressed": (CompressedImage, SENSOR),

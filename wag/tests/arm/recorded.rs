@@ -62,7 +62,7 @@ fn exports_agree(run: &Path) {
     let mut python = Command::new(python);
     python.arg(script).arg(run).arg(run);
     let output = python
-        .args(["/joint_states", "/joint_commands", "/tf", "/rosout"])
+        .args(["/joint_states", "/joint_setpoints", "/tf", "/rosout"])
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", said(&output));
