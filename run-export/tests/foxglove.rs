@@ -130,14 +130,26 @@ fn what_cannot_be_exported_is_refused_by_name_and_nothing_is_written() {
     only("ours", Channel::Summary, json!({}));
     assert!(refused("ours", None).contains("no message"));
     assert!(refused("none", None).contains("does not exist"));
-    let nowhere = at("none/a.mcap");
-    assert!(refused("ours", Some(&nowhere)).contains("none/a.mcap"));
+    let nowhere = at("ours/run.mcap/a.mcap");
+    assert!(refused("ours", Some(&nowhere)).contains("run.mcap"));
 
     let run = small_run(place.path());
     let recording = fs::read(run.join(files::RUN)).unwrap();
     let itself = run.join("../run/run.mcap");
     assert!(refused("run", Some(&itself)).contains("--out"));
     assert!(fs::read(run.join(files::RUN)).unwrap() == recording);
+    // What this program has written is replaced, what another has is not.
+    foxglove(&run, None).unwrap();
+    foxglove(&run, None).unwrap();
+    let mine = at("mine.mcap");
+    let theirs = mcap::WriteOptions::new().library("another");
+    let file = fs::File::create(&mine).unwrap();
+    theirs.create(file).unwrap().finish().unwrap();
+    let failure = foxglove(&run, Some(&mine)).unwrap_err();
+    assert!(
+        failure.to_string().contains("no earlier export"),
+        "{failure}"
+    );
 }
 
 #[test]
