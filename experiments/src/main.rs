@@ -26,7 +26,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let cli: args::Cli = match cli_output::parse(std::env::args_os()) {
         Ok(cli) => cli,
-        Err(e) => return cli_output::refuse_usage(&e),
+        Err(e) => return cli_output::refuse_usage(&submit::with_hint(e)),
     };
     cli_output::start(cli.json, cli.verbose);
     let outcome = match &cli.command {

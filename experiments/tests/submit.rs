@@ -84,7 +84,71 @@ fn processes_of_this_machine_make_a_study_and_go_on_with_it() {
     assert_eq!(std::fs::read(&all).unwrap(), one);
     assert_eq!(std::fs::read(folder.join("shard-1.json")).unwrap(), kept);
     let other = submit(dir.path(), 7, 4);
-    assert_refused(&other, &["all.json.shards", "another"]);
+    let number = "another number of shards 3, not 4:";
+    assert_refused(&other, &["all.json.shards", number]);
+    let other = submit(dir.path(), 8, 3);
+    assert_refused(&other, &["another study [", "\"7\"", "\"8\""]);
+}
+
+/// The number of shards that a line prepares; it runs none.
+fn prepared(dir: &Path, options: &str, study: &str) -> Value {
+    let out = dir.join("all.json");
+    made(&format!(
+        "submit --prepare {options} --out {} -- {study}",
+        out.display()
+    ))["shards"]
+        .clone()
+}
+
+#[test]
+fn a_folder_keeps_its_number_of_shards_and_without_trials_takes_another_study() {
+    let dir = tempfile::tempdir().unwrap();
+    let prepared = |options: &str, study: &str| prepared(dir.path(), options, study);
+    assert_eq!(prepared("--workers 2", "sysid --ropes 40"), 8);
+    assert_eq!(prepared("--workers 3", "sysid --ropes 40"), 8);
+    assert_eq!(prepared("--workers 3 --shards 5", "sysid --ropes 40"), 5);
+    assert_eq!(prepared("--workers 3", "sysid --ropes 41"), 12);
+    // At most one for each trial.
+    assert_eq!(prepared("--workers 3 --shards 100", "sysid --ropes 3"), 3);
+    let per_wiggle = "wiggle-ablation --ropes 3";
+    assert_eq!(prepared("--workers 3 --shards 20", per_wiggle), 20);
+    // A queue may be making the trials of a shard that has no mark yet.
+    std::fs::write(dir.path().join("all.json.shards/shard-1.json"), "{}").unwrap();
+    assert_eq!(prepared("--workers 4", per_wiggle), 20);
+    let out = dir.path().join("all.json");
+    let other = format!(
+        "submit --prepare --workers 3 --out {} -- sysid",
+        out.display()
+    );
+    assert_refused(
+        &other,
+        &["another study [\"wiggle-ablation\",", "[\"sysid\"]"],
+    );
+}
+
+#[test]
+fn a_wrong_study_is_refused_before_anything_is_started() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("all.json");
+    for (study, word) in [
+        ("-- nostudy --ropes 40", "unrecognized subcommand 'nostudy'"),
+        (
+            "-- sysid --rope 40",
+            "argument '--rope' found; tip: a similar argument exists: '--ropes'\n",
+        ),
+        ("-- sysid --ropes many", "invalid value 'many'"),
+        ("-- rooms", "`rooms` has no shards"),
+        ("-- submit --help", "`submit` has no shards"),
+        ("-- real-dlo DIR", "`real-dlo` has no shards"),
+        ("-- sysid --help", "ask without submit"),
+        ("-- sysid --shard 1/8", "`--shards N` before --"),
+        ("-- sysid --shards=8", "`--shards N` before --"),
+        ("sysid --ropes 4", "put -- before the study"),
+    ] {
+        let line = format!("submit --workers 2 --out {} {study}", out.display());
+        assert_refused(&line, &[word]);
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "{line}");
+    }
 }
 
 #[test]
@@ -104,6 +168,8 @@ fn what_a_shard_says_is_kept_and_told() {
     assert!(said.contains("2 of 2 shards failed 2 times"), "{said}");
     let log = std::fs::read_to_string(dir.path().join("all.json.shards/shard-1.log")).unwrap();
     assert!(log.contains("nothing.onnx"), "{log}");
+    let last = log.lines().last().unwrap();
+    assert!(said.contains(&format!("the first is 1: {last}")), "{said}");
     assert!(!out.exists());
     for own in ["--threads 2", "--threads=2", "--json"] {
         let line = format!("submit --workers 2 --out {} -- sysid {own}", out.display());

@@ -37,7 +37,8 @@ pub struct SubmitArgs {
     /// Shards that run at once, at most; of HyperQueue, as many as it has workers for.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub workers: u32,
-    /// Shards of the study; default: four for each worker, so that none waits long for the last.
+    /// Shards of the study, at most its trials; default: as many as there are already, else four for
+    /// each worker, so that none waits long for the last.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     pub shards: Option<u64>,
     /// Threads, and so processors, of a shard.

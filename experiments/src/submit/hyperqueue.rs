@@ -36,10 +36,7 @@ impl HyperQueue {
     }
 
     fn failed(&self) -> anyhow::Error {
-        let said = std::fs::read_to_string(&self.log).unwrap_or_default();
-        let mut lines = said.lines().map(str::trim);
-        let cause = lines.rfind(|line| !line.is_empty());
-        let cause = cause.unwrap_or("it said nothing");
+        let cause = super::last_line(&self.log);
         let remedy = if cause.contains("ModuleNotFoundError") {
             let python = self.python.display();
             format!(

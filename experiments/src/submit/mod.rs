@@ -9,6 +9,9 @@ mod hyperqueue;
 mod local;
 mod shards;
 mod slurm;
+mod study;
+
+pub use study::with_hint;
 
 use crate::args::{EngineName, SubmitArgs};
 use anyhow::Context;
@@ -33,8 +36,6 @@ const LOOK: Duration = Duration::from_millis(500);
 const SEEN_AFTER: Duration = Duration::from_secs(30);
 /// After this long without a shard that has been begun, that is told.
 const IDLE: Duration = Duration::from_secs(60);
-/// Arguments that are this command's to give.
-const OWN: [&str; 4] = ["--out", "--shard", "--threads", "--json"];
 
 fn engine(args: &SubmitArgs, shards: &Shards) -> Box<dyn Engine> {
     match args.engine {
@@ -46,17 +47,12 @@ fn engine(args: &SubmitArgs, shards: &Shards) -> Box<dyn Engine> {
 
 /// Makes a study's shards and joins them; the value is what the study prints.
 pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
-    let own = |word: &&String| OWN.contains(&word.split('=').next().unwrap_or_default());
-    if let Some(own) = args.study.iter().find(own) {
-        return Err(bad_input!(
-            "`{own}` after -- is this command's own: give it before --"
-        ));
-    }
+    let trials = study::check(args)?;
     watch_interrupts().or_failed()?;
     files::check_writable(&args.out).or_input()?;
     let own_file = std::env::current_exe().context("this program's own file");
     let own_file = own_file.or_failed()?;
-    let shards = Shards::open(args).or_input()?;
+    let shards = Shards::open(args, trials).or_input()?;
     shards.write_script(&own_file, args).or_failed()?;
     let script = shards.script();
     let stage = Stage::begin("submit");
@@ -85,10 +81,11 @@ pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
     let missing = shards.missing();
     if let Some(first) = missing.first() {
         return Err(failed!(
-            "{} of {} shards failed {} times; the first is {first}: see the logs in `{}`, or run `{} {first}`",
+            "{} of {} shards failed {} times; the first is {first}: {}; see the logs in `{}`, or run `{} {first}`",
             missing.len(),
             shards.count(),
             args.retries + 1,
+            last_line(&shards.log(*first)),
             shards.folder().display(),
             script.display()
         ));
@@ -101,6 +98,15 @@ pub fn run(args: &SubmitArgs) -> Outcome<Option<Value>> {
         "ok": true, "command": "submit", "shards": shards.count(), "trials": trials,
         "seconds": seconds, "out": args.out, "folder": shards.folder(), "result": result,
     })))
+}
+
+/// The last that a log says.
+fn last_line(log: &Path) -> String {
+    let said = std::fs::read(log).unwrap_or_default();
+    let said = String::from_utf8_lossy(&said);
+    let mut lines = said.lines().map(str::trim);
+    let last = lines.rfind(|line| !line.is_empty());
+    last.unwrap_or("it said nothing").to_owned()
 }
 
 /// Waits until all that was handed over has ended, and for marks that are seen later.

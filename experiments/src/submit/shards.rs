@@ -26,13 +26,13 @@ pub struct Shards {
 }
 
 impl Shards {
-    /// The folder of the shards; one that holds those of something else is refused.
-    pub fn open(args: &SubmitArgs) -> anyhow::Result<Self> {
+    /// The folder of the shards, at most one for each of so many `trials`; one that holds what was
+    /// made of something else is refused.
+    pub fn open(args: &SubmitArgs, trials: Option<u64>) -> anyhow::Result<Self> {
         let name = args.out.file_name().context("--out names no file")?;
         let mut name = name.to_owned();
         name.push(".shards");
         let folder = args.out.with_file_name(name);
-        let count = args.shards.unwrap_or(4 * u64::from(args.workers));
         files::create_folder(&folder)?;
         let folder = folder.canonicalize()?;
         let lock = File::create(folder.join("lock")).context("the shards' lock")?;
@@ -47,22 +47,7 @@ impl Shards {
                 folder.display()
             ),
         }
-        let kept = folder.join("study.json");
-        let kernels = [Precision::F32, Precision::F64].map(Precision::fastest_kernel);
-        let study = json!({
-            "study": args.study, "shards": count, "program": program()?,
-            "kernels": format!("{kernels:?}"),
-        });
-        if kept.exists() {
-            let found: Value = files::read_json(&kept)?;
-            ensure!(
-                found == study,
-                "`{}` holds shards of another study, program or processor, or another number of them: name another --out, or remove it",
-                folder.display()
-            );
-        } else {
-            files::write_json(&kept, &study)?;
-        }
+        let count = settle(&folder, args, trials)?;
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH)?;
         let shards = Self {
             folder,
@@ -183,6 +168,61 @@ impl Drop for Shards {
         // Left behind, it costs a shard that is made twice.
         let _ = std::fs::remove_file(self.submission());
     }
+}
+
+/// Notes what the folder's shards are made of, unless it holds some of the same already; their
+/// number, which stays what it was where none is asked for.
+fn settle(folder: &Path, args: &SubmitArgs, trials: Option<u64>) -> anyhow::Result<u64> {
+    let kept = folder.join("study.json");
+    let kernels = [Precision::F32, Precision::F64].map(Precision::fastest_kernel);
+    let count = args.shards.unwrap_or(4 * u64::from(args.workers));
+    let mut study = json!({
+        "study": args.study, "shards": count.min(trials.unwrap_or(count)), "program": program()?,
+        "kernels": format!("{kernels:?}"),
+    });
+    let found: Value = match kept.exists() {
+        true => files::read_json(&kept)?,
+        false => Value::Null,
+    };
+    let mut others = Vec::new();
+    for (key, what) in [
+        ("study", "study"),
+        ("program", "program"),
+        ("kernels", "processor (its kernels)"),
+        ("shards", "number of shards"),
+    ] {
+        let is_asked = key != "shards" || args.shards.is_some();
+        if is_asked && found[key] != study[key] {
+            others.push(format!("{what} {}, not {}", found[key], study[key]));
+        }
+    }
+    if others.is_empty() {
+        study = found;
+    } else {
+        // A lock is held here, but a queue's shards hold none: what one has kept is left alone.
+        ensure!(
+            found.is_null() || !holds_trials(folder)?,
+            "`{}` holds shards of another {}: name another --out, or remove it",
+            folder.display(),
+            others.join("; ")
+        );
+        files::write_json(&kept, &study)?;
+    }
+    let count = study["shards"].as_u64();
+    count.with_context(|| format!("`{}`: `shards` is no number: remove it", kept.display()))
+}
+
+/// Whether a shard has left trials, or its mark.
+fn holds_trials(folder: &Path) -> anyhow::Result<bool> {
+    for entry in std::fs::read_dir(folder)? {
+        let name = entry?.file_name();
+        let name = name.to_string_lossy();
+        let is_kept = name.ends_with(".json") || name.ends_with(".done");
+        if name.starts_with("shard-") && is_kept {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// A word for the shell.
