@@ -40,6 +40,14 @@ impl Failure {
         Self { is_input, error }
     }
 
+    /// This build lacks what the command needs, which a feature of `wag` brings: bad input.
+    pub fn not_built(cannot: &str, feature: &str) -> Self {
+        Self::input(anyhow::anyhow!(
+            "this build cannot {cannot}; build it with `cargo build --release -p wag --features \
+             {feature}` (the Debian package has it)"
+        ))
+    }
+
     /// A server that could not be: an address that this machine does not have is bad input.
     pub fn of_server(error: impl Into<anyhow::Error>) -> Self {
         let error = error.into();

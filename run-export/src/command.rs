@@ -14,7 +14,7 @@ pub enum ExportCommand {
     /// Cycles, joints, keypoints, plan and rope as arrays for numpy, in the file run.npz or OUT.
     Npz(ExportArgs),
     /// A bag of ROS 2 (MCAP), in the folder ros2 or OUT: it must not exist, or be an earlier one,
-    /// which is replaced.
+    /// which is replaced; in builds with `--features ros2` only.
     Ros2(ExportArgs),
     /// The recording with Foxglove's messages in Protobuf (MCAP), for Foxglove and Rerun, in the
     /// file run.foxglove.mcap or OUT; in builds with `--features foxglove` only.

@@ -1,7 +1,8 @@
 //! A recorded run in the formats of other programs, for those who work on it with their own.
 //!
 //! Each format is a module with one function: of the type [`Write`], but for [`lerobot()`], which
-//! takes several runs. It reads a run through [`run_log::Run`], which it never changes, and writes
+//! takes several runs. Those that cost more to build than all others together are features: without
+//! them their functions refuse. It reads a run through [`run_log::Run`], which it never changes, and writes
 //! whole files or whole folders: what fails leaves nothing behind. Wrong input is told apart from a
 //! failure to write, as [`cli_output::Failure`] has it.
 //!
@@ -16,19 +17,35 @@
 
 mod command;
 mod csv;
-mod destination;
+mod destination_file;
+#[cfg(any(feature = "lerobot", feature = "ros2"))]
+mod destination_folder;
+#[cfg(feature = "foxglove")]
 mod foxglove;
+#[cfg(feature = "lerobot")]
 mod lerobot;
+#[cfg(not(all(feature = "foxglove", feature = "lerobot", feature = "ros2")))]
+mod not_built;
 mod npz;
 mod recorded;
+#[cfg(feature = "ros2")]
 pub mod ros2;
 mod written;
 
 pub use command::{ExportArgs, ExportCommand, LerobotArgs};
 pub use csv::csv;
+#[cfg(feature = "foxglove")]
 pub use foxglove::foxglove;
+#[cfg(feature = "lerobot")]
 pub use lerobot::lerobot;
+#[cfg(not(feature = "foxglove"))]
+pub use not_built::foxglove;
+#[cfg(not(feature = "lerobot"))]
+pub use not_built::lerobot;
+#[cfg(not(feature = "ros2"))]
+pub use not_built::ros2;
 pub use npz::npz;
+#[cfg(feature = "ros2")]
 pub use ros2::ros2;
 pub use written::{Written, WrittenFile};
 

@@ -3,15 +3,33 @@
 //! A program of its own attaches to the shared memory of a run as the recorder does, with the same
 //! messages ([`run_log::Feed`]), and hands them to [`Sink`]s. It only reads: nothing that comes
 //! from a sink's clients reaches the arm, and where it is slow it loses messages of its own.
-#![cfg_attr(test, allow(clippy::float_cmp, reason = "tests compare exact numbers"))]
+//!
+//! Each sink is a feature, because the libraries behind them cost more to build than everything
+//! else that is told; without any, [`run()`] refuses.
 
+mod args;
+#[cfg(any(feature = "foxglove", feature = "ros2"))]
 mod command;
+#[cfg(feature = "ros2")]
+mod domain;
+#[cfg(feature = "foxglove")]
 mod foxglove;
+#[cfg(feature = "ros2")]
 mod ros2;
+#[cfg(any(feature = "foxglove", feature = "ros2"))]
 mod source;
 
-pub use command::{TelemetryArgs, run};
+pub use args::TelemetryArgs;
+#[cfg(not(any(feature = "foxglove", feature = "ros2")))]
+pub use args::run;
+#[cfg(any(feature = "foxglove", feature = "ros2"))]
+pub use command::run;
+#[cfg(feature = "ros2")]
+pub use domain::Domain;
+#[cfg(feature = "foxglove")]
 pub use foxglove::Socket;
-pub use ros2::{Domain, Publisher};
+#[cfg(feature = "ros2")]
+pub use ros2::Publisher;
 pub use run_log::Sink;
+#[cfg(any(feature = "foxglove", feature = "ros2"))]
 pub use source::Source;

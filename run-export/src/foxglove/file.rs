@@ -1,7 +1,7 @@
 //! The file that is written, record by record of the run's.
 
 use super::encoding::{Encoding, of_schema};
-use crate::destination::Destination;
+use crate::destination_file::go_on;
 use anyhow::{Context, Result};
 use mcap::records::{self, MessageHeader, Record, SchemaHeader};
 use mcap::{Attachment, Compression, WriteOptions, Writer};
@@ -56,7 +56,7 @@ impl FoxgloveFile {
     /// # Errors
     /// A message is not as its schema has it.
     pub(super) fn add(&mut self, record: &Record<'_>) -> Result<()> {
-        Destination::go_on()?;
+        go_on()?;
         match record {
             Record::Schema { header, data } => {
                 let schema = (header.clone(), data.to_vec());

@@ -5,14 +5,18 @@
 //! SDK's types, `file` writes the rest as it is. Needs the feature `foxglove`: the SDK brings
 //! crates that nothing else here has.
 
-#[cfg(feature = "foxglove")]
 mod encoding;
-#[cfg(feature = "foxglove")]
 mod file;
 
-use crate::written::Written;
-use cli_output::Outcome;
+use crate::destination_file::{check_file, write_file};
+use crate::written::{Written, WrittenFile};
+use cli_output::{OrInput, Outcome, bad_input};
+use run_log::Run;
+use serde_json::json;
 use std::path::Path;
+
+/// Name of the file, where none is given.
+const FILE: &str = "run.foxglove.mcap";
 
 /// Writes the file `out`, or else `run.foxglove.mcap` in the run's folder: `run.mcap` with the
 /// same topics, times, attachments and tables of texts, its `foxglove.*` messages in Protobuf
@@ -22,17 +26,7 @@ use std::path::Path;
 /// # Errors
 /// The run has no `run.mcap`, or one with a message that is not as this program writes it, or
 /// none of a type of Foxglove's; `out` is a file that is no earlier export, or cannot be written.
-#[cfg(feature = "foxglove")]
 pub fn foxglove(run: &Path, out: Option<&Path>) -> Outcome<Written> {
-    use crate::destination::{check_file, write_file};
-    use crate::written::WrittenFile;
-    use cli_output::{OrInput, bad_input};
-    use run_log::Run;
-    use serde_json::json;
-
-    /// Name of the file, where none is given.
-    const FILE: &str = "run.foxglove.mcap";
-
     let opened = Run::open(run).or_input()?;
     let path = out.map_or_else(|| opened.folder().join(FILE), Path::to_owned);
     check_file(&path, file::is_export).or_input()?;
@@ -58,29 +52,4 @@ pub fn foxglove(run: &Path, out: Option<&Path>) -> Outcome<Written> {
         figures: json!({ "messages": messages, "protobuf": converted, "bytes": bytes.len() }),
         missing,
     })
-}
-
-/// Always refuses.
-///
-/// # Errors
-/// How a build that can is made.
-#[cfg(not(feature = "foxglove"))]
-pub fn foxglove(_run: &Path, _out: Option<&Path>) -> Outcome<Written> {
-    Err(cli_output::bad_input!(
-        "this build cannot write the messages of Foxglove's SDK; build it with `cargo build \
-         --release -p wag --features foxglove` (the Debian package has it). Foxglove opens \
-         run.mcap as it is, too"
-    ))
-}
-
-#[cfg(all(test, not(feature = "foxglove")))]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_build_without_it_says_how_one_with_it_is_made() {
-        let failure = foxglove(Path::new("run"), None).unwrap_err();
-        assert_eq!(failure.exit_code(), 2);
-        assert!(failure.to_string().contains("--features foxglove"));
-    }
 }

@@ -3,7 +3,7 @@
 
 mod file;
 
-use crate::destination::{check_file, write_file};
+use crate::destination_file::{check_file, write_file};
 use crate::recorded::RecordedRun;
 use crate::written::{Written, WrittenFile};
 use anyhow::Result;

@@ -2,7 +2,7 @@
 
 use super::topics::{Promise, Topic};
 use super::translation::Messages;
-use crate::destination::Destination;
+use crate::destination_file::go_on;
 use anyhow::{Context, Result};
 use mcap::records::{MessageHeader, Statistics};
 use mcap::{Compression, WriteOptions, Writer};
@@ -135,7 +135,7 @@ impl Bag {
 
 impl Messages for Bag {
     fn add(&mut self, topic: &'static Topic, at_ns: u64, message: Vec<u8>) -> Result<()> {
-        let added = Destination::go_on().and_then(|()| self.write(topic, at_ns, &message));
+        let added = go_on().and_then(|()| self.write(topic, at_ns, &message));
         self.is_failed |= added.is_err();
         added
     }

@@ -11,7 +11,7 @@ pub use definitions::Definition;
 pub use topics::{ALL, PICTURES, Promise, Topic};
 pub use translation::{Messages, Translation};
 
-use crate::destination::Destination;
+use crate::destination_folder::Destination;
 use crate::written::{Written, WrittenFile};
 use anyhow::Context;
 use bag::{Bag, MARK, MESSAGES, METADATA};

@@ -124,6 +124,14 @@ fn a_run_without_messages_or_with_a_foreign_one_is_refused_by_name() {
     let words = ["foreign/run.mcap", "/arm/measured", "1500000000 ns"];
     assert!(words.iter().all(|word| said.contains(word)), "{said}");
     assert!(refused(ros2, &at("none"), &out).contains("does not exist"));
+    assert!(refused(ros2, place.path(), &out).contains("run.mcap"));
+    fs::write(at("notvideo.avi"), "RIFF").unwrap();
+    let said = refused(ros2, &at("notvideo.avi"), &out);
+    assert!(
+        said.contains("notvideo.avi") && said.contains("not an MCAP file"),
+        "{said}"
+    );
+    fs::remove_file(at("notvideo.avi")).unwrap();
     assert!(refused(npz, &at("nothing"), &out).contains("nothing"));
     // What is there is written, what is not is told.
     let line = json!({ "level": 2, "message": "x", "name": "n" });

@@ -1,12 +1,10 @@
 //! Where a folder that is exported goes: it appears whole, in place of nothing or of an earlier
 //! export.
 
+use crate::destination_file::{go_on, make_parent};
 use anyhow::{Context, Result, anyhow, ensure};
-use cli_output::is_interrupted;
-use run_log::files;
 use shared_types::file_error::why;
-use std::fs::{self, File};
-use std::io::Read;
+use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -44,16 +42,10 @@ impl Destination {
         self.building.path()
     }
 
-    /// Fails where the command was interrupted: what was built goes by itself.
-    pub(crate) fn go_on() -> Result<()> {
-        ensure!(!is_interrupted(), "interrupted: nothing was written");
-        Ok(())
-    }
-
     /// Puts it in its place. Between the two renames nothing is there; where the second fails, the
     /// earlier export comes back.
     pub(crate) fn put(self) -> Result<()> {
-        Self::go_on()?;
+        go_on()?;
         let fail = || format!("cannot write `{}`", self.folder.display());
         let aside = temporary(&self.folder)?;
         let earlier = aside.path().join("earlier");
@@ -66,44 +58,6 @@ impl Destination {
         }
         put.with_context(fail)
     }
-}
-
-/// So many bytes of a file tell whether it is an earlier export.
-const BEGIN: u64 = 64;
-
-/// Looks at a file that is to be written: there is nothing yet, or an earlier export, which
-/// `is_export` knows by how it begins, and which is no run's own recording.
-///
-/// # Errors
-/// There is something else, or nothing can be written there.
-pub(crate) fn check_file(path: &Path, is_export: fn(&[u8]) -> bool) -> Result<()> {
-    let name = path.display();
-    if let Ok(real) = path.canonicalize()
-        && real.is_file()
-    {
-        let mut begin = Vec::new();
-        let read = File::open(&real).and_then(|file| file.take(BEGIN).read_to_end(&mut begin));
-        let is_export = read.is_ok() && is_export(&begin);
-        ensure!(
-            is_export && real.file_name() != Some(files::RUN.as_ref()),
-            "`{name}` is there and is no earlier export, so it is not replaced: name another file \
-             with --out"
-        );
-    }
-    make_parent(path)?;
-    files::check_writable(path)
-}
-
-/// Writes a file, unless the command was interrupted.
-pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    Destination::go_on()?;
-    files::write_atomic(path, bytes)
-}
-
-/// Makes the folder that something is to lie in.
-fn make_parent(path: &Path) -> Result<()> {
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
-    parent.map_or(Ok(()), files::create_folder)
 }
 
 /// A folder of its own beside `folder`. The library's error tells a name that nobody knows.
@@ -160,24 +114,5 @@ mod tests {
         export(&place.path().join("none/export"), "first").unwrap();
         let nowhere = export(&to.join("mark/export"), "first").unwrap_err();
         assert!(nowhere.to_string().contains("mark"), "{nowhere}");
-    }
-
-    #[test]
-    fn a_file_that_is_no_earlier_export_stays() {
-        let place = tempfile::tempdir().unwrap();
-        let at = |name: &str| place.path().join(name);
-        let is_export: fn(&[u8]) -> bool = |begin| begin.starts_with(b"PK");
-        check_file(&at("new/run.npz"), is_export).unwrap();
-        for (name, words) in [
-            ("mine.txt", "words"),
-            (files::RUN, "PK, a recording"),
-            ("empty", ""),
-        ] {
-            fs::write(at(name), words).unwrap();
-            let refused = check_file(&at(name), is_export).unwrap_err().to_string();
-            assert!(refused.contains("no earlier export"), "{refused}");
-        }
-        fs::write(at("run.npz"), "PK of before").unwrap();
-        check_file(&at("run.npz"), is_export).unwrap();
     }
 }
