@@ -1,10 +1,10 @@
 //! A recorded run in the formats of other programs, for those who work on it with their own.
 //!
 //! Each format is a module with one function: of the type [`Write`], but for [`lerobot()`], which
-//! takes several runs. Those that cost more to build than all others together are features: without
-//! them their functions refuse. It reads a run through [`run_log::Run`], which it never changes, and writes
+//! takes several runs. It reads a run through [`run_log::Run`], which it never changes, and writes
 //! whole files or whole folders: what fails leaves nothing behind. Wrong input is told apart from a
-//! failure to write, as [`cli_output::Failure`] has it.
+//! failure to write, as [`cli_output::Failure`] has it. Formats that cost more to build than the
+//! others together are features; without them their functions refuse.
 //!
 //! ```no_run
 //! # fn main() -> cli_output::Outcome {

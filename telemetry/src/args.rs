@@ -62,10 +62,10 @@ fn address(text: &str) -> Result<SocketAddr, String> {
     address.ok_or_else(|| "give ADDR:PORT or PORT, such as 127.0.0.1:8765 or 8765".to_owned())
 }
 
-/// Would tell the messages of a run.
+/// Would tell the messages of a run, in a build with a sink.
 ///
 /// # Errors
-/// Always: how a build that can is made.
+/// What is wanted is not in this build: how one that has it is made.
 #[cfg(not(any(feature = "foxglove", feature = "ros2")))]
 pub fn run<Run, Cell, Report>(
     args: &TelemetryArgs,
