@@ -143,6 +143,15 @@ mod tests {
     }
 
     #[test]
+    fn what_a_build_lacks_is_told_with_its_feature() {
+        let failure = Failure::not_built("write bags of ROS 2", "ros2");
+        assert_eq!(failure.exit_code(), 2);
+        let words = "this build cannot write bags of ROS 2; build it with `cargo build --release \
+                     -p wag --features ros2` (the Debian package has it)";
+        assert_eq!(failure.to_string(), words);
+    }
+
+    #[test]
     fn a_slip_is_told_and_a_stranger_is_not() {
         let refusal =
             "unknown field `populaton`, expected one of `dimensions`, `population`, `seed`";

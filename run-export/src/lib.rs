@@ -3,8 +3,8 @@
 //! Each format is a module with one function: of the type [`Write`], but for [`lerobot()`], which
 //! takes several runs. It reads a run through [`run_log::Run`], which it never changes, and writes
 //! whole files or whole folders: what fails leaves nothing behind. Wrong input is told apart from a
-//! failure to write, as [`cli_output::Failure`] has it. Formats that cost more to build than the
-//! others together are features; without them their functions refuse.
+//! failure to write, as [`cli_output::Failure`] has it. Formats that need libraries of
+//! their own are features; without them their functions refuse.
 //!
 //! ```no_run
 //! # fn main() -> cli_output::Outcome {

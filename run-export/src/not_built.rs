@@ -32,26 +32,3 @@ pub fn lerobot(_runs: &[std::path::PathBuf], _out: &Path, _fps: Option<u32>) -> 
 pub fn ros2(_run: &Path, _out: Option<&Path>) -> Outcome<Written> {
     Err(Failure::not_built("write bags of ROS 2", "ros2"))
 }
-
-#[cfg(all(
-    test,
-    not(any(feature = "foxglove", feature = "lerobot", feature = "ros2"))
-))]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn each_names_its_feature() {
-        let none = Path::new("none");
-        let refused = [
-            (foxglove(none, None), "--features foxglove`"),
-            (lerobot(&[], none, None), "--features lerobot`"),
-            (ros2(none, None), "--features ros2`"),
-        ];
-        for (outcome, named) in refused {
-            let failure = outcome.unwrap_err();
-            assert_eq!(failure.exit_code(), 2);
-            assert!(failure.to_string().contains(named), "{failure}");
-        }
-    }
-}

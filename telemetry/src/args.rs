@@ -67,11 +67,11 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 /// # Errors
 /// What is wanted is not in this build: how one that has it is made.
 #[cfg(not(any(feature = "foxglove", feature = "ros2")))]
-pub fn run<Run, Cell, Report>(
+pub fn run(
     args: &TelemetryArgs,
-    _wanted: Run,
-    _here: Cell,
+    _wanted: viewer::live::Wanted,
+    _here: run_log::CellHere,
     _seconds: Option<f64>,
-) -> Outcome<Option<Report>> {
+) -> Outcome<Option<serde_json::Value>> {
     args.check().map(|()| None)
 }

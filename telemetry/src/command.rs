@@ -55,7 +55,7 @@ impl Sink for Sinks {
 /// Tells the messages of the run that is wanted until Ctrl-C, or for a while.
 ///
 /// # Errors
-/// The domain cannot be joined, or there is no place to serve at.
+/// What is wanted is not in this build, the domain cannot be joined, or there is no place to serve at.
 pub fn run(
     args: &TelemetryArgs,
     wanted: Wanted,

@@ -4,8 +4,8 @@
 //! messages ([`run_log::Feed`]), and hands them to [`Sink`]s. It only reads: nothing that comes
 //! from a sink's clients reaches the arm, and where it is slow it loses messages of its own.
 //!
-//! Each sink is a feature, because the libraries behind them cost more to build than everything
-//! else that is told; without any, [`run()`] refuses.
+//! Each sink is a feature, because each needs many libraries of its own; without any, [`run()`]
+//! refuses.
 
 mod args;
 #[cfg(any(feature = "foxglove", feature = "ros2"))]
@@ -30,6 +30,5 @@ pub use domain::Domain;
 pub use foxglove::Socket;
 #[cfg(feature = "ros2")]
 pub use ros2::Publisher;
-pub use run_log::Sink;
 #[cfg(any(feature = "foxglove", feature = "ros2"))]
 pub use source::Source;

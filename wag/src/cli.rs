@@ -118,7 +118,7 @@ pub enum Command {
         /// Run folder, or its file run.mcap (cycles.bin of an older version).
         run: PathBuf,
     },
-    /// Write a recorded run in another format: tables, arrays for numpy, a bag of ROS 2.
+    /// Write a recorded run in another format: tables, arrays for numpy, files of other programs.
     #[command(subcommand)]
     Export(run_export::ExportCommand),
     /// Write a run as one HTML file: replay in space, joints, limits, rope, times.

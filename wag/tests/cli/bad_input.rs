@@ -1,7 +1,7 @@
 //! Wrong input to every command: exit code 2 (or 1), one clear line that names
 //! the file and the field, nothing half-written.
 
-use super::cases::{FAILED, MACHINES, RECORDS, ROPES, SIM_ROPE};
+use super::cases::{FAILED, FEATURES, MACHINES, RECORDS, ROPES, SIM_ROPE};
 use super::files::{LINKS, prepare};
 use super::support::{are_refused_in, command, refused_in, said, wag_in};
 use std::ffi::OsStr;
@@ -13,7 +13,8 @@ fn wrong_input_gets_one_clear_line_and_leaves_nothing_behind() {
     let dir = prepare();
     let ropes = ROPES.replace("LINKS", LINKS);
     let sim_rope = SIM_ROPE.replace("--rope", "sim rope --fps 60 --out o.npy --rope");
-    for cases in [MACHINES, RECORDS, &ropes, &sim_rope] {
+    let all = [MACHINES, RECORDS, &ropes, &sim_rope];
+    for cases in all.into_iter().chain(FEATURES) {
         are_refused_in(dir.path(), 2, cases);
     }
     are_refused_in(dir.path(), 1, FAILED);

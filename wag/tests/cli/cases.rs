@@ -1,6 +1,30 @@
 //! Wrong command lines: one a line, with the words that must be in its error behind `=>`.
 //! `|` stands between the words. They run in the folder of `files.rs`; `LINKS` is a model.
 
+/// Exports and live sinks of this build, or what a build without them says.
+pub(crate) const FEATURES: [&str; 3] = [
+    if cfg!(feature = "ros2") {
+        "export ros2 none.run => none.run | does not exist
+        export ros2 . => ./run.mcap | no such file
+        export ros2 notvideo.avi => notvideo.avi | not an MCAP file
+        watch --ros2=300 => --ros2 | 232"
+    } else {
+        "export ros2 none.run => this build | --features ros2` | Debian package
+        watch --ros2 => this build | --features ros2`"
+    },
+    if cfg!(feature = "foxglove") {
+        "export foxglove none.run => none.run | does not exist"
+    } else {
+        "export foxglove none.run => this build | --features foxglove`
+        watch --foxglove => this build | --features foxglove`"
+    },
+    if cfg!(feature = "lerobot") {
+        "export lerobot none.run --out set => none.run | does not exist"
+    } else {
+        "export lerobot none.run --out set => this build | --features lerobot`"
+    },
+];
+
 /// Commands that start processes or move an arm, and the configuration.
 pub(crate) const MACHINES: &str = "
     => Usage
