@@ -1,7 +1,7 @@
 //! What a running arm, its camera and its tracker publish, live for other programs.
 //!
 //! A program of its own attaches to the shared memory of a run as the recorder does, with the same
-//! messages ([`run_log::Feed`]), and hands them to [`Sink`]s. It only reads: nothing that comes
+//! messages ([`run_log::Feed`]), and hands them to [`run_log::Sink`]s. It only reads: nothing that comes
 //! from a sink's clients reaches the arm, and where it is slow it loses messages of its own.
 //!
 //! Each sink is a feature, because each needs many libraries of its own; without any, [`run()`]
