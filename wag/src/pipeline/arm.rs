@@ -20,7 +20,7 @@ const MOVED_WITHIN_S: f64 = 600.0;
 pub type ArmLink = RpcClient<ControllerRpc>;
 
 /// The error of an event that ends a request badly.
-fn refusal(what: &str, event: &ControllerEvent) -> anyhow::Error {
+pub fn refusal(what: &str, event: &ControllerEvent) -> anyhow::Error {
     match event {
         ControllerEvent::Refused { fault, message } => {
             anyhow!("the controller refused {what} ({fault:?}): {message}")

@@ -8,7 +8,7 @@ mod run_folder;
 mod service;
 
 pub use arm::{
-    ArmLink, BringUp, acquire, arm_for, arm_simulated, enable, execute, latency, move_to,
+    ArmLink, BringUp, acquire, arm_for, arm_simulated, enable, execute, latency, move_to, refusal,
 };
 pub use camera::{FramesFrom, Scene, start_camera};
 pub use processes::{ArmAddress, controller, rig_config, start, start_recorder, start_rig};

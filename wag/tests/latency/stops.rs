@@ -1,6 +1,6 @@
 //! `wag latency --stops` on a simulated arm.
 
-use super::support::{alone, json_in, refused_in};
+use super::support::{alone, json_in, moved_in, refused_in};
 use std::path::Path;
 use xarm_sim::{ArmConfig, SimulatedArm};
 
@@ -17,10 +17,10 @@ fn stops_are_measured_at_rising_speeds_by_the_brake_and_by_the_arm() {
     let [joints, _, status, _] = ports.reports;
     let dir = tempfile::tempdir().unwrap();
     let line = format!(
-        "latency --arm 127.0.0.1 --command-port {} --report-port {joints} --status-port {status} --stops --out run",
+        "latency --arm 127.0.0.1 --command-port {} --report-port {joints} --status-port {status} --stops",
         ports.command
     );
-    let reported = json_in(dir.path(), &line);
+    let reported = moved_in(dir.path(), &line, "run");
     let number = |stop: &serde_json::Value, key: &str| stop[key].as_f64().unwrap();
     let stops = reported["stops"].as_array().unwrap();
     let told: Vec<_> = stops

@@ -2,6 +2,7 @@
 //! a real one: late and missed cycles, time on the wire both ways, a clock of
 //! its own, encoder steps and f32.
 
+use super::support::alone;
 use super::{Errors, report, secret_lags};
 use arm_model::response::{Excitation, JointResponse, NotExcited};
 use arm_model::{JOINTS, JointTrajectory, JointVector, Limits, Pole};
@@ -134,6 +135,8 @@ fn run(mut arm: ArmModel, programme: &Programme, rng: &mut ChaCha8Rng) -> Record
 
 #[test]
 fn twenty_secret_arms_are_found_within_two_milliseconds_and_ten_percent() {
+    // In virtual time, but with all of a processor: the others want theirs in time.
+    let _alone = alone();
     let mut errors = Vec::new();
     let mut inside = [0_u32; 3];
     for seed in 0..SEEDS {

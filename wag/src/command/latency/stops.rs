@@ -8,8 +8,8 @@ use crate::cli::LatencyArgs;
 use crate::command::area::{asks, limits, reach_measured, require_clear_area};
 use crate::command::on_arm::{AT_START, MOVE_SPEED, on_arm};
 use crate::config;
-use crate::pipeline::{self, ArmLink, BringUp};
-use anyhow::{Context, bail, ensure};
+use crate::pipeline::{self, ArmLink, BringUp, refusal};
+use anyhow::{Context, ensure};
 use arm_model::joint::START_POSE;
 use arm_model::kinematics::tool_speed_m_s;
 use arm_model::{JointTrajectory, Limits, Pole};
@@ -81,13 +81,14 @@ fn stop(
     })?;
     let start_ns = match session.next(&motion, 5.0)? {
         ControllerEvent::Started { start_ns } => start_ns,
-        other => bail!("the swing did not begin: {other:?}"),
+        other => return Err(refusal("the swing", &other)),
     };
     let half_ns = start_ns + (0.5e9 * swing.duration_s()) as u64;
     while now_ns() < half_ns {
         session.tick()?;
         if let Some(event) = motion.try_next()? {
-            bail!("the swing ended before it was to be stopped: {event:?}");
+            return Err(refusal("the swing", &event))
+                .context("it ended before it was to be stopped");
         }
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -109,10 +110,9 @@ fn stop(
     let end = session.finish(&motion, 5.0, |_| ());
     session.end_hold();
     let end = end?;
-    ensure!(
-        method.has_caused(&end),
-        "something else stopped the swing: {end:?}"
-    );
+    if !method.has_caused(&end) {
+        return Err(refusal("the swing", &end)).context("something else stopped it");
+    }
     session.idle(WATCHED)?;
     let reports = session.received.cycles.reports();
     let stopping = Stopping::measured(&reports, told_ns, pole).map_err(anyhow::Error::msg)?;
