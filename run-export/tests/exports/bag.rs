@@ -1,6 +1,6 @@
 //! Runs as bags of ROS 2.
 
-use super::{break_off, names_in, refused, small, validate};
+use super::{break_off, exports, names_in, refused, small};
 use run_export::ros2;
 use run_log::{Channel, files};
 use serde_json::json;
@@ -27,7 +27,7 @@ fn readers_of_bags_find_every_message_of_the_run() {
     for write in [run_export::csv, run_export::npz] {
         write(&run, None).unwrap();
     }
-    validate(
+    exports::agree(
         &run,
         &["/joint_states", "/tf_static", "/camera/left/camera_info"],
     );

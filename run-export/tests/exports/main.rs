@@ -2,6 +2,8 @@
 //! libraries read them, what is refused, and what is left behind.
 #![cfg(test)]
 
+#[path = "../../../hil-tests/support/exports.rs"]
+mod exports;
 #[path = "../../../hil-tests/support/missing.rs"]
 mod missing;
 
@@ -13,7 +15,6 @@ use run_export::{Write, csv, npz};
 use run_log::files;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 /// What an export that must fail as wrong input says.
 fn refused(write: Write, run: &Path, out: &Path) -> String {
@@ -29,22 +30,6 @@ fn names_in(folder: &Path) -> Vec<String> {
         .collect();
     names.sort();
     names
-}
-
-/// Fails unless the published libraries find in a run's exports what the run holds, on these topics
-/// of a bag, too.
-fn validate(run: &Path, topics: &[&str]) {
-    let python = missing::named("WAG_SDK_PYTHON", "Python with mcap, numpy and rosbags");
-    let Some(python) = python else {
-        return;
-    };
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../.ci/validate-exports");
-    let mut python = Command::new(python);
-    let output = python.arg(script).args([run, run]).args(topics).output();
-    let output = output.unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    print!("{}", String::from_utf8_lossy(&output.stdout));
 }
 
 /// Cuts the run's file off at the record that ends the data, which lies before the index.
@@ -73,7 +58,7 @@ fn other_libraries_find_the_values_of_the_run() {
     let mut all = [before, exported.to_vec()].concat();
     all.sort();
     assert_eq!(names_in(&run), all);
-    validate(&run, &[]);
+    exports::agree(&run, &[]);
 }
 
 #[test]

@@ -2,6 +2,9 @@
 //! explains the run, lets others join, and survives the death of its recorder, which stops
 //! no motion.
 
+#[path = "../../../hil-tests/support/exports.rs"]
+mod exports;
+
 use super::support::{
     Rig, alone, command, ended, has, json, missing, process_of, refused_in, said, send,
     shared_memory_of, until, until_recorded, wag,
@@ -49,19 +52,6 @@ fn python_agrees(file: &Path) {
     let mut python = Command::new(python);
     python.arg(script).arg(file).args(TOPICS.split(' '));
     let output = python.output().unwrap();
-    assert!(output.status.success(), "{}", said(&output));
-}
-
-/// Published Python libraries find the run in its exports, where they are there.
-fn exports_agree(run: &Path, topics: &[&str]) {
-    let python = missing::named("WAG_SDK_PYTHON", "Python with mcap, numpy and rosbags");
-    let Some(python) = python else {
-        return;
-    };
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../.ci/validate-exports");
-    let mut python = Command::new(python);
-    let output = python.arg(script).args([run, run]).args(topics).output();
-    let output = output.unwrap();
     assert!(output.status.success(), "{}", said(&output));
 }
 
@@ -200,7 +190,7 @@ fn its_file_is_whole(run: &Path) {
     } else {
         &[]
     };
-    exports_agree(run, topics);
+    exports::agree(run, topics);
     if cfg!(feature = "foxglove") {
         json(&format!("export foxglove {name}"));
         protobuf_agrees(run);
