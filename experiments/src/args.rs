@@ -46,6 +46,11 @@ pub enum Command {
     Rooms(RoomsArgs),
     /// Count the wiggles in drawn rooms that the tracker follows, refuses and gets wrong.
     TrackRooms(TrackRoomsArgs),
+    /// Make the library of throws that plans of strikes begin with.
+    ///
+    /// Takes a second for each search; interrupted, it keeps nothing. The library that comes with
+    /// this version is configs/models/throws.bin, compiled into the programs.
+    Throws(ThrowsArgs),
     /// Figures of README and book: make them, write them into the documents, check these.
     #[command(subcommand)]
     Figures(FiguresCommand),
@@ -176,6 +181,26 @@ pub struct FilmArgs {
     pub threads: Option<u16>,
 }
 
+/// Arguments of `experiments throws`.
+#[derive(Debug, Args)]
+pub struct ThrowsArgs {
+    /// Searches, each for a random rope and target of its own.
+    #[arg(long, default_value_t = 400, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub searches: u32,
+    /// Throws kept of each search, about 270 bytes each.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub kept: u16,
+    /// Seed of ropes, targets and searches.
+    #[arg(long, default_value_t = 1, value_parser = seed)]
+    pub seed: u64,
+    /// Threads; the library does not depend on them. Default: one a processor.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Library to write.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+}
+
 /// Arguments of `experiments rooms`.
 #[derive(Debug, Args)]
 pub struct RoomsArgs {
@@ -272,6 +297,9 @@ pub enum BenchName {
     Identify,
     /// Planning: time of one throw of each task, and what it is spent on.
     Plan,
+    /// Planning strikes from the library of throws beside searching for them: time, and miss with
+    /// ropes that differ by what identification leaves open.
+    Library,
     /// Tracking: time of each stage per frame, and memory, on a recorded wiggle.
     Track,
 }

@@ -20,6 +20,7 @@ mod report;
 mod results;
 mod rooms;
 mod submit;
+mod throws;
 
 use std::process::ExitCode;
 
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         args::Command::Bench(bench) => bench::run(bench),
         args::Command::Figures(command) => figures::run(command),
         args::Command::Rooms(args) => rooms::run(args),
+        args::Command::Throws(args) => throws::run(args),
         args::Command::TrackRooms(args) => rooms::track::run(args),
         args::Command::Merge(args) => results::merge(args),
         args::Command::Submit(args) => submit::run(args),

@@ -4,6 +4,7 @@
 //! is 0 whatever the figures are.
 
 mod identify;
+mod library;
 mod plan;
 mod rope;
 mod spent;
@@ -19,6 +20,7 @@ pub fn run(args: &BenchArgs) -> Outcome<Option<Value>> {
         BenchName::Rope => rope::run(args),
         BenchName::Identify => identify::run(args),
         BenchName::Plan => plan::run(args),
+        BenchName::Library => library::run(args),
         BenchName::Track => track::run(args),
     }
 }

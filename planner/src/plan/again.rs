@@ -130,7 +130,7 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
             miss_m: Some(miss_m),
         }),
         unconfirmed: last.unconfirmed.clone(),
-        ..setup.finish(chosen, count)?
+        ..setup.finish(chosen, &mut count)?
     })
 }
 

@@ -232,6 +232,9 @@ pub struct PlanOptions {
     /// Most searches: where one ends without a throw that is good enough, the next
     /// begins with other random numbers. 1 is the paper's budget.
     pub searches: usize,
+    /// Throws of the library that are tried before any search; 0 is the paper's way, which
+    /// searches at once.
+    pub recalled: usize,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Step of the rope simulation for finalists and their polish (s).
@@ -255,6 +258,7 @@ impl Default for PlanOptions {
             population: 60,
             generations: None,
             searches: 3,
+            recalled: 64,
             seed: 0,
             step_s: 5e-4,
             search_step_s: 1e-3,
@@ -286,6 +290,8 @@ impl PlanOptions {
         let generations = [("generations", generations)];
         within(1.0..=GENERATIONS_MAX, "from 1 to 10000000", &generations)?;
         let searches = [("searches", self.searches as f64)];
-        within(0.0..=1e3, "at most 1000", &searches)
+        within(0.0..=1e3, "at most 1000", &searches)?;
+        let recalled = [("recalled", self.recalled as f64)];
+        within(0.0..=1e3, "at most 1000", &recalled)
     }
 }

@@ -30,15 +30,15 @@ pub(super) fn best_first(finalists: &mut [Finalist]) {
 }
 
 impl Setup<'_> {
-    /// The best of a search with all ropes; the best of those polished.
+    /// The best of a search with all ropes; so many of them polished.
     pub(super) fn compare(
         &self,
         found: Vec<Point>,
+        polished: usize,
         count: &mut Count,
     ) -> Result<Vec<Finalist>, PlanError> {
         let mut finalists = self.finalists(found, count)?;
         if self.task.polishes() {
-            let polished = self.task.config().robustness.polished;
             let best = finalists.iter().take(polished).map(|f| f.x.clone());
             let polished = self.polish(best.collect(), count)?;
             let points = polished.into_iter().map(|x| {

@@ -35,10 +35,14 @@ pub fn plan_task(
     check(task, request)?;
     let setup = Setup::new(task, request)?;
     let mut count = Count::default();
+    if let Some(plan) = setup.recalled(&mut count)? {
+        return Ok(plan);
+    }
     let mut finalists: Vec<Finalist> = Vec::new();
+    let polished = setup.task.config().robustness.polished;
     for round in 0..request.options.searches.max(1) {
         let found = setup.search(round, &mut count, progress)?;
-        finalists.extend(setup.compare(found, &mut count)?);
+        finalists.extend(setup.compare(found, polished, &mut count)?);
         best_first(&mut finalists);
         if !setup.task.polishes() {
             setup.confirm(&mut finalists, &mut count)?;
@@ -54,7 +58,7 @@ pub fn plan_task(
         setup.robust(finalists, &mut count, progress)?
     };
     let chosen = chosen.ok_or(PlanError::OnlyCollisions(count.simulations))?;
-    setup.finish(chosen, count)
+    setup.finish(chosen, &mut count)
 }
 
 /// Refuses what cannot be planned, before any simulation.
@@ -71,7 +75,7 @@ pub(super) fn check(task: &dyn ThrowTask, request: &PlanRequest) -> Result<(), P
 impl Setup<'_> {
     /// The plan as it is written down. The prediction comes from double precision at half
     /// the step.
-    pub(super) fn finish(&self, chosen: Finalist, mut count: Count) -> Result<Plan, PlanError> {
+    pub(super) fn finish(&self, chosen: Finalist, count: &mut Count) -> Result<Plan, PlanError> {
         let (request, trajectory) = (self.request, chosen.trajectory);
         if let Some(margin) = request.limits.worst_violation(&trajectory) {
             return Err(PlanError::BreaksLimit(margin.describe()));

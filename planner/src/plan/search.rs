@@ -1,7 +1,7 @@
 //! The search loop: draw, screen, value, learn.
 
-use super::PlanError;
 use super::setup::{Count, Point, Setup};
+use super::{PlanError, ThrowOutcome};
 use arm_model::JointTrajectory;
 use cmaes::{CmaEs, CmaOptions, StopRules};
 use shared_types::ipc::message::Progress;
@@ -109,8 +109,20 @@ impl Setup<'_> {
         count: &mut Count,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Vec<Point>, PlanError> {
+        let value = |trajectories: &[JointTrajectory]| {
+            Ok(self.valued(trajectories, &self.thrown(trajectories)?))
+        };
+        let (found, spent) = self.explore(&self.search_of(round), value, progress)?;
+        count.simulations += spent.simulations;
+        count.resampled += spent.resampled;
+        count.interrupted |= spent.interrupted;
+        Ok(found)
+    }
+
+    /// What search `round` is.
+    pub(super) fn search_of(&self, round: usize) -> Search<'_> {
         let (options, config) = (&self.request.options, self.task.config());
-        let search = Search {
+        Search {
             start: &self.start,
             spread: 1.0,
             population: options.population,
@@ -119,22 +131,34 @@ impl Setup<'_> {
             stop_below_m: options.stop_below_m,
             stop_success_fraction: config.stop_success_fraction,
             keep: config.robustness.finalists,
-        };
+        }
+    }
+
+    /// The rope planned for, thrown with the step that ranks.
+    ///
+    /// # Errors
+    /// What the simulator refuses.
+    pub(super) fn thrown(
+        &self,
+        trajectories: &[JointTrajectory],
+    ) -> Result<Vec<ThrowOutcome>, PlanError> {
         let rope = &self.request.rope;
-        let value = |trajectories: &[JointTrajectory]| {
-            let throws: Vec<_> = trajectories.iter().map(|t| (rope, t)).collect();
-            let outcomes = self.searching.run(&throws)?;
-            let valued = trajectories.iter().zip(&outcomes).map(|(t, o)| Valued {
-                fitness: self.fitness(rope, t, &self.widened(t, o)),
-                error_m: self.task.error_m(o),
-                success: o.finite && o.contacts.none() && self.task.judge(rope, o).success,
-            });
-            Ok(valued.collect())
-        };
-        let (found, spent) = self.explore(&search, value, progress)?;
-        count.simulations += spent.simulations;
-        count.resampled += spent.resampled;
-        count.interrupted |= spent.interrupted;
-        Ok(found)
+        let throws: Vec<_> = trajectories.iter().map(|t| (rope, t)).collect();
+        self.searching.run(&throws)
+    }
+
+    /// What throws are worth for what they did.
+    pub(super) fn valued(
+        &self,
+        trajectories: &[JointTrajectory],
+        outcomes: &[ThrowOutcome],
+    ) -> Vec<Valued> {
+        let rope = &self.request.rope;
+        let valued = trajectories.iter().zip(outcomes).map(|(t, o)| Valued {
+            fitness: self.fitness(rope, t, &self.widened(t, o)),
+            error_m: self.task.error_m(o),
+            success: o.finite && o.contacts.none() && self.task.judge(rope, o).success,
+        });
+        valued.collect()
     }
 }

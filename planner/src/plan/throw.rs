@@ -26,6 +26,8 @@ pub struct ThrowOutcome {
     /// Whether the simulation stayed finite; the other fields mean nothing if
     /// it did not.
     pub finite: bool,
+    /// The tip at the sampled instants (m).
+    pub tip_m: Vec<[f64; 3]>,
     /// Everything the task asked to be watched.
     pub watched: Watched,
     /// What the rope did with each obstacle of the task's scene.
@@ -153,6 +155,7 @@ impl ThrowSimulator {
         let mut nodes: Vec<Vector3<f64>> = Vec::new();
         let mut arm = ArmShape::at(&motion.state_at(0.0).q, &self.cell.pole);
         let mut of_arm = ContactCounts::default();
+        let mut tip_m = Vec::with_capacity(rollout.nodes.frames());
         let mut time_s = 0.0;
         for frame in 0..rollout.nodes.frames() {
             // Once the arm stands, only the rope moves on.
@@ -165,6 +168,7 @@ impl ThrowSimulator {
             nodes.clear();
             nodes
                 .extend((0..rollout.nodes.nodes()).map(|node| rollout.nodes.position(frame, node)));
+            tip_m.extend(nodes.last().map(|p| <[f64; 3]>::from(*p)));
             contacts += rope_contacts(&arm, &self.cell, &shape, &nodes);
             time_s += self.contact_period_s;
         }
@@ -177,6 +181,7 @@ impl ThrowSimulator {
             closest_s: closest.map_or(0.0, |c| c.time_s),
             contacts,
             finite: closest.is_some(),
+            tip_m,
             watched: rollout.watched.clone(),
             obstacles: rollout.contacts.clone(),
             domino: rollout.domino,
