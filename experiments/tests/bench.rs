@@ -100,6 +100,22 @@ fn bench_identify_prints_every_method() {
 }
 
 #[test]
+fn bench_library_compares_both_ways_of_planning() {
+    let report = report("bench library --quick");
+    assert_eq!(report["command"], "bench library");
+    let [library, search] = report["ways"].as_array().unwrap().as_slice() else {
+        panic!("{report}");
+    };
+    assert_eq!(library["searched"], 0);
+    assert_eq!(search["searched"], report["pairs"]);
+    for way in [library, search] {
+        assert_eq!(way["plans"], report["pairs"]);
+        assert!(positive(way, "/median_ms") <= positive(way, "/p95_ms"));
+        assert!(positive(way, "/miss_max_mm") < 10.0, "{way}");
+    }
+}
+
+#[test]
 fn bench_plan_splits_the_time_of_every_task() {
     let report = report("bench plan --quick");
     let tasks = report["tasks"].as_array().unwrap();
