@@ -17,6 +17,7 @@ pub fn run(args: &ThrowsArgs) -> Outcome<Option<Value>> {
         kept: args.kept.into(),
     };
     let threads = args.threads.map_or(Machine::here().cores, usize::from);
+    files::check_writable(&args.out).or_input()?;
     let stage = Stage::begin("throws");
     let library = ThrowLibrary::make(options, threads, &mut |progress| {
         stage.progress(&progress);

@@ -169,3 +169,29 @@ fn wrong_input_is_refused_with_the_reason() {
         assert_refused(line, words);
     }
 }
+
+#[test]
+fn a_library_of_throws_is_written_or_refused_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("throws.bin");
+    let line = format!(
+        "throws --searches 1 --kept 3 --seed 9 --out {}",
+        out.display()
+    );
+    let report = report(&line);
+    assert_eq!(
+        (&report["throws"], &report["options"]["seed"]),
+        (&3.into(), &9.into())
+    );
+    let bytes = std::fs::read(&out).unwrap();
+    assert_eq!(report["bytes"], bytes.len());
+    assert_eq!(
+        planner::plan::ThrowLibrary::from_bytes(&bytes)
+            .unwrap()
+            .len(),
+        3
+    );
+    let nowhere = dir.path().join("no/throws.bin");
+    let line = format!("throws --out {}", nowhere.display());
+    assert_refused(&line, &["no such folder"]);
+}
