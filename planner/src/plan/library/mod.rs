@@ -22,9 +22,9 @@ use super::waypoints::WAYPOINTS;
 /// Joints that move in the plane of a throw.
 const PLANAR: usize = 3;
 
-/// How far the tip of a throw moves, in the plane and per range of a parameter, when that
-/// parameter changes (m): what a rope of other parameters counts like a tip that far off.
-/// Medians over throws of random searches.
+/// What a rope of other parameters counts like, as a distance of the tip, per range of a
+/// parameter (m). The length moves the tip by about itself; the others are rough, for the
+/// throws that are chosen by them are simulated again with the rope itself.
 const SHIFT_PER_RANGE_M: [f64; ROPE_PARAMETERS] = [0.0, 0.2, 0.05, 0.05, 0.0, 0.05, 0.05, 0.0, 0.0];
 
 /// The library that comes with this version (`configs/models/README.md`).
