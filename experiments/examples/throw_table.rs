@@ -87,6 +87,7 @@ fn main() {
             segment_stretch_max: args.stretch,
             seed,
             searches: args.searches,
+            library_candidates: 0,
             threads: args.threads,
             ..config.search
         };

@@ -25,7 +25,7 @@ const IDENTIFIED: u64 = 1000;
 pub(crate) fn built_in() -> Result<PlannerConfig, toml::de::Error> {
     let mut config: PlannerConfig =
         toml::from_str(include_str!("../../../configs/planner/planner.toml"))?;
-    config.search.recalled = 0;
+    config.search.library_candidates = 0;
     Ok(config)
 }
 

@@ -234,7 +234,7 @@ pub struct PlanOptions {
     pub searches: usize,
     /// Throws of the library that are tried before any search; 0 is the paper's way, which
     /// searches at once.
-    pub recalled: usize,
+    pub library_candidates: usize,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Step of the rope simulation for finalists and their polish (s).
@@ -258,7 +258,7 @@ impl Default for PlanOptions {
             population: 60,
             generations: None,
             searches: 3,
-            recalled: 64,
+            library_candidates: 64,
             seed: 0,
             step_s: 5e-4,
             search_step_s: 1e-3,
@@ -291,7 +291,7 @@ impl PlanOptions {
         within(1.0..=GENERATIONS_MAX, "from 1 to 10000000", &generations)?;
         let searches = [("searches", self.searches as f64)];
         within(0.0..=1e3, "at most 1000", &searches)?;
-        let recalled = [("recalled", self.recalled as f64)];
-        within(0.0..=1e3, "at most 1000", &recalled)
+        let library_candidates = [("library_candidates", self.library_candidates as f64)];
+        within(0.0..=1e3, "at most 1000", &library_candidates)
     }
 }

@@ -12,7 +12,8 @@ use shared_types::{LimitedBy, Plan, VERSION, Verdict};
 use std::ops::ControlFlow;
 
 /// Plans a throw. Deterministic for a seed, whatever the threads. `progress` is told
-/// of every generation; interrupted by it, the throw is planned with what has been found.
+/// of every generation, and once of the library's throws; interrupted by it, the throw is planned
+/// with what has been found.
 ///
 /// # Errors
 /// See [`PlanError`]; an unreachable target is refused before any simulation.
@@ -35,7 +36,7 @@ pub fn plan_task(
     check(task, request)?;
     let setup = Setup::new(task, request)?;
     let mut count = Count::default();
-    if let Some(plan) = setup.recalled(&mut count)? {
+    if let Some(plan) = setup.recalled(&mut count, progress)? {
         return Ok(plan);
     }
     let mut finalists: Vec<Finalist> = Vec::new();
@@ -73,21 +74,41 @@ pub(super) fn check(task: &dyn ThrowTask, request: &PlanRequest) -> Result<(), P
 }
 
 impl Setup<'_> {
-    /// The plan as it is written down. The prediction comes from double precision at half
-    /// the step.
+    /// The plan of the throw that was chosen.
     pub(super) fn finish(&self, chosen: Finalist, count: &mut Count) -> Result<Plan, PlanError> {
-        let (request, trajectory) = (self.request, chosen.trajectory);
+        let exact = self.exact_outcome(&chosen.trajectory, count)?;
+        let outcome = exact.unwrap_or(chosen.outcome);
+        self.written(chosen.trajectory, &outcome, count)
+    }
+
+    /// What a throw does with the rope planned for, in double precision at half the step; `None`
+    /// if the simulation diverges.
+    pub(super) fn exact_outcome(
+        &self,
+        trajectory: &JointTrajectory,
+        count: &mut Count,
+    ) -> Result<Option<ThrowOutcome>, PlanError> {
+        count.add(1);
+        let throws = [(&self.request.rope, trajectory)];
+        let outcomes = self.judging.exact().run(&throws)?;
+        Ok(outcomes.into_iter().find(|o| o.finite))
+    }
+
+    /// The plan as it is written down.
+    pub(super) fn written(
+        &self,
+        trajectory: JointTrajectory,
+        outcome: &ThrowOutcome,
+        count: &mut Count,
+    ) -> Result<Plan, PlanError> {
+        let request = self.request;
         if let Some(margin) = request.limits.worst_violation(&trajectory) {
             return Err(PlanError::BreaksLimit(margin.describe()));
         }
         let rope = &request.rope;
-        let exact = self.judging.exact().run(&[(rope, &trajectory)])?;
-        count.add(1);
-        let exact = exact.into_iter().find(|o| o.finite);
-        let outcome = exact.unwrap_or(chosen.outcome);
         let forecast = self.forecast(&trajectory)?;
         count.add(request.ensemble.forecast.len());
-        let verdict = self.task.judge(rope, &outcome);
+        let verdict = self.task.judge(rope, outcome);
         Ok(Plan {
             version: VERSION.to_owned(),
             seed: request.options.seed,
@@ -96,11 +117,11 @@ impl Setup<'_> {
             aim: None,
             rope: *rope,
             cell: Some(request.cell),
-            predicted_error_m: self.task.error_m(&outcome),
+            predicted_error_m: self.task.error_m(outcome),
             predicted_time_s: outcome.closest_s,
-            fitness: self.fitness(rope, &trajectory, &outcome),
+            fitness: self.fitness(rope, &trajectory, outcome),
             interrupted: count.interrupted,
-            limited_by: Some(self.limited_by(&trajectory, &outcome, &verdict)),
+            limited_by: Some(self.limited_by(&trajectory, outcome, &verdict)),
             verdict,
             forecast,
             unconfirmed: Vec::new(),

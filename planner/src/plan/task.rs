@@ -46,7 +46,8 @@ pub trait ThrowTask: Sync {
     fn judge(&self, rope: &RopeParams, outcome: &ThrowOutcome) -> Verdict;
 
     /// Whether the closest approach to [`Watch::point_m`] is all that counts and has
-    /// slopes, so that it can be polished.
+    /// slopes, so that it can be polished, and throws of the library at that point are throws
+    /// of this task.
     fn polishes(&self) -> bool {
         false
     }
@@ -95,6 +96,7 @@ pub fn simulator_for(
         contact_period_s: config.contact_period_s,
         cell: *cell,
         following: None,
+        keeps_tip: false,
         threads: options.threads.max(1),
     }
 }

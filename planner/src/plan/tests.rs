@@ -14,7 +14,7 @@ pub(super) fn request(target_m: [f64; 3]) -> PlanRequest {
         population: 24,
         generations: Some(12),
         searches: 1,
-        recalled: 0,
+        library_candidates: 0,
         ..PlanOptions::default()
     };
     PlanRequest::new(goal, &random_rope(11), options)

@@ -26,7 +26,7 @@ pub struct ThrowOutcome {
     /// Whether the simulation stayed finite; the other fields mean nothing if
     /// it did not.
     pub finite: bool,
-    /// The tip at the sampled instants (m).
+    /// The tip every `contact_period_s` from 0 s on (m, base frame), where it is kept.
     pub tip_m: Vec<[f64; 3]>,
     /// Everything the task asked to be watched.
     pub watched: Watched,
@@ -67,6 +67,8 @@ pub struct ThrowSimulator {
     pub cell: Cell,
     /// How the arm follows what it is told; none for an arm that does exactly that.
     pub following: Option<Following>,
+    /// Whether outcomes keep the path of the tip.
+    pub keeps_tip: bool,
     /// Threads.
     pub threads: usize,
 }
@@ -155,7 +157,7 @@ impl ThrowSimulator {
         let mut nodes: Vec<Vector3<f64>> = Vec::new();
         let mut arm = ArmShape::at(&motion.state_at(0.0).q, &self.cell.pole);
         let mut of_arm = ContactCounts::default();
-        let mut tip_m = Vec::with_capacity(rollout.nodes.frames());
+        let mut tip_m = Vec::new();
         let mut time_s = 0.0;
         for frame in 0..rollout.nodes.frames() {
             // Once the arm stands, only the rope moves on.
@@ -168,7 +170,8 @@ impl ThrowSimulator {
             nodes.clear();
             nodes
                 .extend((0..rollout.nodes.nodes()).map(|node| rollout.nodes.position(frame, node)));
-            tip_m.extend(nodes.last().map(|p| <[f64; 3]>::from(*p)));
+            let tip = nodes.last().filter(|_| self.keeps_tip);
+            tip_m.extend(tip.map(|p| <[f64; 3]>::from(*p)));
             contacts += rope_contacts(&arm, &self.cell, &shape, &nodes);
             time_s += self.contact_period_s;
         }

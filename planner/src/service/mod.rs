@@ -3,7 +3,7 @@
 //! [`settle`](crate::settle()).
 //!
 //! One thread serves; identification and planning use the machine's other
-//! threads. Progress is streamed with every generation or step; a caller that leaves
+//! threads. Progress is streamed with every generation, step or look into the library; a caller that leaves
 //! ends the work.
 
 mod collect;

@@ -36,7 +36,7 @@ pub struct PlanArgs {
     pub target: Point,
     #[command(flatten)]
     pub planner: PlannerArgs,
-    /// Seed of the search.
+    /// Seed of the search; a strike from the library hardly depends on it.
     #[arg(long, default_value_t = 1, value_parser = seed)]
     pub seed: u64,
     /// Search the durations of the throw's segments too: each up to this many times as

@@ -92,6 +92,7 @@ fn throws_planned_through_the_response_meet_their_targets() {
             let small = !long_tests();
             let options = PlanOptions {
                 seed,
+                library_candidates: 0,
                 population: if small { 24 } else { 60 },
                 generations: small.then_some(12),
                 searches: if small { 1 } else { 3 },

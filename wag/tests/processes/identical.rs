@@ -57,6 +57,7 @@ fn strike() -> PlannerRequest {
     let goal = config.goal(Task::Strike, [0.95, 0.0, 0.2]);
     let options = PlanOptions {
         seed: 1,
+        library_candidates: 0,
         ..config.search
     };
     let request = PlanRequest::new(goal, &random_rope(1), options);

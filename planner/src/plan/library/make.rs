@@ -6,7 +6,7 @@ use super::super::setup::Setup;
 use super::super::{
     Dimensions, PlanError, PlanOptions, PlanRequest, Strike, ThrowConfig, ThrowGoal,
 };
-use super::{KeptThrow, ThrowLibrary};
+use super::{StoredThrow, ThrowLibrary};
 use crate::ropes::{random_rope, random_strike_target};
 use arm_model::JointTrajectory;
 use rand::SeedableRng;
@@ -29,13 +29,14 @@ pub struct LibraryOptions {
     pub kept: usize,
 }
 
-/// Keeps ropes and targets apart from those of trials and of anybody's seeds.
+/// Keeps ropes and targets apart from those of trials.
 const SALT: u64 = 0x11b4_0000_0000_0000;
 /// Of the instants at which contacts are looked for, every so many is kept.
 const EVERY: usize = 2;
 
 impl ThrowLibrary {
-    /// Makes a library. Deterministic, whatever the threads; `progress` is told of every search.
+    /// Makes a library. Deterministic, whatever the threads; `progress` is told of every search,
+    /// and interrupting it leaves those before.
     ///
     /// # Errors
     /// What the simulator refuses.
@@ -74,7 +75,7 @@ fn kept_of(
     index: u64,
     config: &ThrowConfig,
     threads: usize,
-) -> Result<Vec<KeptThrow>, PlanError> {
+) -> Result<Vec<StoredThrow>, PlanError> {
     let seed = SALT ^ (options.seed << 32) ^ index;
     let rope = random_rope(seed);
     let [x, y, z] = random_strike_target(seed);
@@ -92,14 +93,15 @@ fn kept_of(
     if check(task, &request).is_err() {
         return Ok(Vec::new());
     }
-    let setup = Setup::new(task, &request)?;
+    let mut setup = Setup::new(task, &request)?;
+    setup.searching.keeps_tip = true;
     let tried = RefCell::new(Vec::new());
     let value = |trajectories: &[JointTrajectory]| {
         let outcomes = setup.thrown(trajectories)?;
         let valued = setup.valued(trajectories, &outcomes);
         let free = trajectories.iter().zip(outcomes);
         let free = free.filter(|(_, o)| o.finite && o.contacts.none());
-        let kept = free.map(|(t, o)| KeptThrow::new(&request.rope, t, &o.tip_m));
+        let kept = free.map(|(t, o)| StoredThrow::new(&request.rope, t, &o.tip_m));
         tried.borrow_mut().extend(kept);
         Ok(valued)
     };
@@ -114,7 +116,7 @@ fn kept_of(
     Ok(kept.into_iter().map(|i| tried[i].clone()).collect())
 }
 
-impl KeptThrow {
+impl StoredThrow {
     fn new(rope: &RopeParams, throw: &JointTrajectory, tip_m: &[[f64; 3]]) -> Self {
         let (knots, joints) = (throw.waypoints(), Dimensions::Planar.joints());
         let mm = |m: f64| (m * 1e3).round() as i16;

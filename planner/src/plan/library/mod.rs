@@ -32,7 +32,7 @@ const EMBEDDED: &[u8] = include_bytes!("../../../../configs/models/throws.bin");
 
 /// One throw.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct KeptThrow {
+struct StoredThrow {
     /// Parameters of the rope, order of [`RANGES`].
     rope: [f32; ROPE_PARAMETERS],
     /// Joints 2, 4 and 6 at each waypoint (rad).
@@ -53,7 +53,7 @@ pub struct ThrowLibrary {
     times_s: [f64; WAYPOINTS],
     /// Time between two places of a tip (s).
     period_s: f64,
-    throws: Vec<KeptThrow>,
+    throws: Vec<StoredThrow>,
 }
 
 /// Why a library cannot be read.
@@ -62,8 +62,8 @@ pub struct ThrowLibrary {
 pub struct LibraryError(postcard::Error);
 
 impl ThrowLibrary {
-    /// The library that comes with this version; an empty one if it cannot be read, which a
-    /// test rules out.
+    /// The library that comes with this version; `None` if it cannot be read, which a test rules
+    /// out.
     pub(super) fn embedded() -> Option<&'static Self> {
         static LIBRARY: OnceLock<Option<ThrowLibrary>> = OnceLock::new();
         LIBRARY
@@ -104,7 +104,7 @@ impl ThrowLibrary {
     /// parameters of the rope count as distance.
     fn nearest(&self, rope: &RopeParams, target_m: [f64; 2], count: usize) -> Vec<Vec<f64>> {
         let rope = rope.to_array();
-        let mut near: Vec<(f64, &KeptThrow)> = self
+        let mut near: Vec<(f64, &StoredThrow)> = self
             .throws
             .iter()
             .map(|throw| {
@@ -120,14 +120,14 @@ impl ThrowLibrary {
         }
         near.truncate(count);
         near.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        let joints = |throw: &KeptThrow| throw.waypoints_rad.as_flattened().to_vec();
+        let joints = |throw: &StoredThrow| throw.waypoints_rad.as_flattened().to_vec();
         near.into_iter()
             .map(|(_, throw)| joints(throw).into_iter().map(f64::from).collect())
             .collect()
     }
 }
 
-impl KeptThrow {
+impl StoredThrow {
     /// Least distance of the tip's path, straight between its places, from a point (m).
     fn tip_distance_m(&self, [x, z]: [f64; 2]) -> f64 {
         let place = |p: &[i16; 2]| [f64::from(p[0]) * 1e-3 - x, f64::from(p[1]) * 1e-3 - z];

@@ -1,10 +1,13 @@
 //! A plan from the library, where it has a throw that is good enough.
 
-use super::super::finalists::Finalist;
+use super::super::search::Valued;
 use super::super::setup::{Count, Point, Setup};
-use super::super::{Dimensions, PlanError, PlanOptions, PlanRequest};
+use super::super::{Dimensions, PlanError, PlanOptions, PlanRequest, ThrowOutcome};
 use super::ThrowLibrary;
-use shared_types::{LimitedBy, Plan};
+use arm_model::JointTrajectory;
+use shared_types::Plan;
+use shared_types::ipc::message::Progress;
+use std::ops::ControlFlow;
 
 /// Throws of the library that are compared over several ropes, and how many of them are polished.
 const COMPARED: usize = 4;
@@ -12,11 +15,16 @@ const POLISHED: usize = 2;
 
 impl Setup<'_> {
     /// The plan of the best of the library's throws, polished. None where the library has no
-    /// throws for such a request, or none that needs no search.
+    /// throws for such a request, or none that needs no search, and when `progress`, which is told
+    /// of them once, interrupts.
     ///
     /// # Errors
     /// What the simulator refuses.
-    pub(in super::super) fn recalled(&self, count: &mut Count) -> Result<Option<Plan>, PlanError> {
+    pub(in super::super) fn recalled(
+        &self,
+        count: &mut Count,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Option<Plan>, PlanError> {
         let library = ThrowLibrary::embedded().filter(|library| self.suits(library));
         let Some(library) = library else {
             return Ok(None);
@@ -33,25 +41,53 @@ impl Setup<'_> {
         };
         let quick = Setup::new(self.task, &request)?;
         let found = quick.recall(library, count)?;
-        if found.is_empty() {
-            return Ok(None);
-        }
-        let finalists = quick.compare(found, POLISHED, count)?;
-        let best: Option<Finalist> = finalists.into_iter().find(|f| quick.is_good(f));
-        let Some(best) = best else {
+        let Some((nearest, _)) = found.first() else {
             return Ok(None);
         };
-        let plan = self.finish(best, count)?;
-        Ok((plan.limited_by == Some(LimitedBy::Nothing)).then_some(plan))
+        let compared = Progress {
+            done: 1,
+            total: 1,
+            value: 100.0 * nearest.error_m,
+            label: "best cm".to_owned(),
+        };
+        if progress(compared).is_break() {
+            return Ok(None);
+        }
+        let points = found.into_iter().map(|(_, point)| point).collect();
+        let polished = POLISHED.min(self.task.config().robustness.polished);
+        let finalists = quick.compare(points, polished, count)?;
+        let Some(best) = finalists.into_iter().find(|f| quick.is_good(f)) else {
+            return Ok(None);
+        };
+        // What the search's step hides is found out here.
+        let outcome = self.exact_outcome(&best.trajectory, count)?;
+        let Some(outcome) = outcome.filter(|o| self.is_met(&best.trajectory, o)) else {
+            return Ok(None);
+        };
+        self.written(best.trajectory, &outcome, count).map(Some)
     }
 
-    /// The best of the library's throws with the rope planned for, best first.
-    fn recall(&self, library: &ThrowLibrary, count: &mut Count) -> Result<Vec<Point>, PlanError> {
+    /// Whether a throw meets its target, touches nothing and keeps every limit.
+    fn is_met(&self, trajectory: &JointTrajectory, outcome: &ThrowOutcome) -> bool {
+        let request = self.request;
+        self.is_close(outcome)
+            && outcome.contacts.none()
+            && self.task.judge(&request.rope, outcome).success
+            && request.limits.worst_violation(trajectory).is_none()
+    }
+
+    /// The best of the library's throws with the rope planned for, best first, and what they are
+    /// worth.
+    fn recall(
+        &self,
+        library: &ThrowLibrary,
+        count: &mut Count,
+    ) -> Result<Vec<(Valued, Point)>, PlanError> {
         let [x, y, z] = self.task.target_m();
-        let wanted = self.request.options.recalled;
+        let wanted = self.request.options.library_candidates;
         let near = library.nearest(&self.request.rope, [x.hypot(y), z], 2 * wanted);
         let points = near.into_iter().map(|mut x| {
-            // Neither turned nor stretched.
+            // Not turned.
             x.resize(self.space.count(), 0.0);
             x
         });
@@ -71,8 +107,8 @@ impl Setup<'_> {
             .zip(points.into_iter().zip(trajectories))
             .collect();
         best.sort_by(|(a, _), (b, _)| a.fitness.total_cmp(&b.fitness));
-        best.truncate(COMPARED);
-        Ok(best.into_iter().map(|(_, point)| point).collect())
+        best.truncate(COMPARED.min(self.task.config().robustness.finalists.max(1)));
+        Ok(best)
     }
 
     /// Whether the library's throws are throws of this request.
@@ -81,7 +117,8 @@ impl Setup<'_> {
         let times_s = self.task.config().waypoint_times_s;
         let mut times_s = times_s.iter().zip(&library.times_s);
         let same_times = times_s.all(|(a, b)| (a - b).abs() < 1e-9);
-        options.recalled > 0
+        options.library_candidates > 0
+            && !self.space.is_timed()
             && options.dimensions == Dimensions::Planar
             && self.task.polishes()
             && same_times

@@ -1,4 +1,6 @@
-use super::super::{Dimensions, PlanOptions, PlanRequest, ThrowGoal, plan};
+use super::super::{
+    Dimensions, PlanOptions, PlanRequest, PosteriorEnsemble, ThrowGoal, plan, simulator_for,
+};
 use super::*;
 use crate::PlannerConfig;
 use crate::ropes::{random_strike_target, trial_rope};
@@ -34,6 +36,32 @@ fn strikes_of_unknown_ropes_are_planned_without_a_search_and_keep_every_limit() 
     }
 }
 
+/// In a cell that the library's throws were not made in, by an independent simulation.
+#[test]
+fn a_longer_pole_and_a_raised_floor_are_kept_clear_of() {
+    let mut strikes = 0;
+    for index in 10..16 {
+        let (mut request, _) = strike(index, PlanOptions::default());
+        request.cell.pole.length_m += 0.02;
+        request.cell.floor_z_m = -0.6;
+        let Ok(planned) = plan(&request, &mut |_| ControlFlow::Continue(())) else {
+            continue;
+        };
+        let task = request.goal.task();
+        let simulator = simulator_for(task, &request.rope, &request.cell, &request.options);
+        let throws = [(&request.rope, &planned.trajectory)];
+        let outcome = simulator.exact().run(&throws).unwrap().remove(0);
+        if planned.simulations < 250 {
+            strikes += 1;
+            assert!(
+                outcome.contacts.none() && outcome.closest_m < 1e-3,
+                "{outcome:?}"
+            );
+        }
+    }
+    assert!(strikes > 0, "the library was of no use in this cell");
+}
+
 #[test]
 fn what_the_library_has_no_throws_for_is_searched_for() {
     let small = PlanOptions {
@@ -43,21 +71,46 @@ fn what_the_library_has_no_throws_for_is_searched_for() {
         ..PlanOptions::default()
     };
     let searched = |request: &PlanRequest| {
-        let planned = plan(request, &mut |_| ControlFlow::Break(())).unwrap();
-        // The first generation asks whether to go on.
-        planned.interrupted
+        // The library asks whether to go on once, a search after each generation.
+        let mut asked = 0;
+        let planned = plan(request, &mut |progress| {
+            asked += usize::from(progress.total > 1);
+            ControlFlow::Continue(())
+        });
+        planned.unwrap();
+        asked > 0
     };
     let (request, planned) = strike(1, small);
     assert!(!planned.interrupted && !searched(&request));
+    // Interrupted at once, it is what one generation found.
+    let broken = plan(&request, &mut |_| ControlFlow::Break(())).unwrap();
+    assert!(broken.interrupted);
+    let ensemble = PosteriorEnsemble {
+        optimised: vec![request.rope],
+        ..PosteriorEnsemble::default()
+    };
+    assert!(searched(&PlanRequest {
+        ensemble,
+        ..request.clone()
+    }));
     let none = PlanOptions {
-        recalled: 0,
+        library_candidates: 0,
         ..small
     };
     let full = PlanOptions {
         dimensions: Dimensions::Full,
         ..small
     };
-    for options in [none, full] {
+    let stretched = PlanOptions {
+        segment_stretch_max: 1.3,
+        ..small
+    };
+    // No throw is as good.
+    let better = PlanOptions {
+        good_enough_m: 1e-12,
+        ..small
+    };
+    for options in [none, full, stretched, better] {
         assert!(searched(&PlanRequest {
             options,
             ..request.clone()
@@ -82,8 +135,8 @@ fn what_the_library_has_no_throws_for_is_searched_for() {
     assert!(searched(&PlanRequest { limits, ..request }));
 }
 
-fn kept(rope: &RopeParams, tip_mm: &[[i16; 2]]) -> KeptThrow {
-    KeptThrow {
+fn kept(rope: &RopeParams, tip_mm: &[[i16; 2]]) -> StoredThrow {
+    StoredThrow {
         rope: rope.to_array().map(|v| v as f32),
         waypoints_rad: [[f32::from(tip_mm[0][0]); PLANAR]; WAYPOINTS],
         tip_mm: tip_mm.to_vec(),
