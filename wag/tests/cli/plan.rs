@@ -7,7 +7,8 @@ use serde_json::Value;
 use std::time::Duration;
 
 /// A search that would last for hours.
-const ENDLESS: &str = "[search]\ngenerations = 1000000\npopulation = 2000\nlibrary_candidates = 0\n";
+const ENDLESS: &str =
+    "[search]\ngenerations = 1000000\npopulation = 2000\nlibrary_candidates = 0\n";
 
 #[test]
 fn a_correction_without_a_miss_or_a_throw_is_refused() {
