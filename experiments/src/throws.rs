@@ -28,10 +28,7 @@ pub fn run(args: &ThrowsArgs) -> Outcome<Option<Value>> {
     })
     .or_failed()?;
     if is_interrupted() {
-        return Err(Failure::of(
-            false,
-            anyhow!("interrupted: nothing is written"),
-        ));
+        return Err(Failure::failed(anyhow!("interrupted: nothing is written")));
     }
     let bytes = library.to_bytes().or_failed()?;
     files::write_atomic(&args.out, &bytes).or_failed()?;

@@ -1,7 +1,6 @@
 //! Makes a library: the throws that searches for random ropes and targets try on their way.
 
 use super::super::planning::check;
-use super::super::search::Search;
 use super::super::setup::Setup;
 use super::super::{
     Dimensions, PlanError, PlanOptions, PlanRequest, Strike, ThrowConfig, ThrowGoal,
@@ -105,11 +104,9 @@ fn kept_of(
         tried.borrow_mut().extend(kept);
         Ok(valued)
     };
-    let search = Search {
-        stop_below_m: None,
-        ..setup.search_of(0)
-    };
-    setup.explore(&search, value, &mut |_| ControlFlow::Continue(()))?;
+    setup.explore(&setup.search_of(0), value, &mut |_| {
+        ControlFlow::Continue(())
+    })?;
     let tried = tried.into_inner();
     let count = options.kept.min(tried.len());
     let kept = sample(&mut ChaCha12Rng::seed_from_u64(seed), tried.len(), count);
