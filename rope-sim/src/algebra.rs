@@ -177,6 +177,11 @@ impl<V: Lanes> Quat<V> {
         }
     }
     #[inline(always)]
+    pub(crate) fn get(&self, lane: usize) -> [f64; 4] {
+        let [x, y, z] = self.v.get(lane);
+        [self.w.get(lane), x, y, z]
+    }
+    #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, q: [f64; 4]) {
         self.w.set(lane, q[0]);
         self.v.set(lane, [q[1], q[2], q[3]]);

@@ -2,7 +2,7 @@
 
 use crate::base_path::{BasePath, Interval, NotFinite};
 use crate::contact::check_start;
-use crate::equilibrium::{StartState, hanging_links, swaying_links};
+use crate::equilibrium::{hanging_links, swaying_links};
 use crate::error::SimulateError;
 use crate::group::{GroupTask, Member};
 use crate::knot::attitude;
@@ -12,6 +12,7 @@ use crate::rollout::{Candidate, Outcome, Rollout, SimOptions, Start, Sway, check
 use crate::scene::{ContactSummary, DominoOutcome, Scene};
 use crate::watch::Watched;
 use nalgebra::{UnitQuaternion, Vector3};
+use shared_types::RopeState;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -98,6 +99,7 @@ fn forget_measures(rollout: &mut Rollout) {
     rollout.peak_tip_speed_m_s = 0.0;
     rollout.contacts.fill(ContactSummary::default());
     rollout.domino = rollout.domino.map(|_| DominoOutcome::default());
+    rollout.end = None;
 }
 
 /// Candidates to run with one kernel and step.
@@ -253,6 +255,7 @@ impl Batch<'_> {
             frames: self.options.frames,
             watch: self.options.watch,
             horizon_s: self.options.horizon_s,
+            keeps_end: self.options.keeps_end,
             single_precision: self.kernel.is_single_precision(),
         }
     }
@@ -263,16 +266,19 @@ fn address(motion: &dyn AttachMotion) -> Option<usize> {
     (size_of_val(motion) > 0).then(|| core::ptr::from_ref(motion).cast::<()>().addr())
 }
 
-fn start_state(candidate: &Candidate, path: &BasePath, start: Start) -> StartState {
+fn start_state(candidate: &Candidate, path: &BasePath, start: Start) -> RopeState {
     let rope = candidate.rope;
+    if let Some(state) = candidate.state {
+        return state.clone();
+    }
     match start {
         Start::Straight { joint0_rotvec } => {
             let turn = UnitQuaternion::from_scaled_axis(Vector3::from(joint0_rotvec));
             let q = attitude(&path.start) * turn;
-            StartState::at_rest(vec![[q.w, q.i, q.j, q.k]; rope.links as usize])
+            RopeState::at_rest(vec![[q.w, q.i, q.j, q.k]; rope.links as usize])
         }
         Start::Equilibrium if candidate.sway == Sway::NONE => {
-            StartState::at_rest(hanging_links(rope, &path.start.r))
+            RopeState::at_rest(hanging_links(rope, &path.start.r))
         }
         Start::Equilibrium => swaying_links(rope, &path.start.r, &candidate.sway),
     }

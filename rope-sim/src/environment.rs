@@ -39,6 +39,21 @@ impl<V: Lanes> Environment<V> {
         }
     }
 
+    /// Moments of friction that a lane starts with (N m, world); empty for none.
+    #[inline(always)]
+    pub(crate) fn put_friction(&mut self, lane: usize, moments_nm: &[[f64; 3]]) {
+        if let Some(friction) = &mut self.extras.friction {
+            friction.put(lane, moments_nm);
+        }
+    }
+
+    /// Moments of friction of a lane (N m, world); empty for none.
+    #[inline(always)]
+    pub(crate) fn friction_nm(&self, lane: usize) -> Vec<[f64; 3]> {
+        let friction = self.extras.friction.as_ref();
+        friction.map_or_else(Vec::new, |friction| friction.moments_nm(lane))
+    }
+
     /// Looks around from where the rope starts.
     #[inline(always)]
     pub(crate) fn start(&mut self, links: &[Link<V>], rope: &RopeLanes<V>, attach: &BaseState<V>) {

@@ -22,7 +22,7 @@ use shared_types::RopeParams;
 pub(crate) struct ExtraLanes<V> {
     drag: Option<DragLanes<V>>,
     masses: Option<MassLanes<V>>,
-    friction: Option<FrictionLanes<V>>,
+    pub(crate) friction: Option<FrictionLanes<V>>,
     clamp: Option<ClampLanes<V>>,
     is_curved: bool,
 }

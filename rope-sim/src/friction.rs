@@ -59,6 +59,20 @@ impl<V: Lanes> FrictionLanes<V> {
         self.clamp.set(lane, rope.beyond().clamp_stiffness);
     }
 
+    /// Moments that a lane starts with (N m, world); empty for none.
+    #[inline(always)]
+    pub(crate) fn put(&mut self, lane: usize, moments_nm: &[[f64; 3]]) {
+        for (joint, moment) in self.joints.iter_mut().zip(moments_nm) {
+            joint.moment.set(lane, *moment);
+        }
+    }
+
+    /// Moments of a lane (N m, world).
+    #[inline(always)]
+    pub(crate) fn moments_nm(&self, lane: usize) -> Vec<[f64; 3]> {
+        self.joints.iter().map(|j| j.moment.get(lane)).collect()
+    }
+
     /// Notes how the joints turn at the start.
     #[inline(always)]
     pub(crate) fn start(&mut self, links: &[Link<V>], attach: &BaseLanes<V>) {

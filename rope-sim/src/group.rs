@@ -5,7 +5,6 @@ use crate::base_path::BasePath;
 use crate::clock::Clock;
 use crate::contact::Contacts;
 use crate::environment::Environment;
-use crate::equilibrium::StartState;
 use crate::frames::{FrameRecorder, FrameTimes, NodeTrack};
 use crate::kernel::{Elimination, step};
 use crate::lanes::{LaneTask, Lanes};
@@ -14,7 +13,7 @@ use crate::rollout::{Outcome, Rollout};
 use crate::scene::Scene;
 use crate::state::{Link, RopeLanes};
 use crate::watch::{Watch, Watcher};
-use shared_types::RopeParams;
+use shared_types::{RopeParams, RopeState};
 
 /// Steps between health checks.
 const HEALTH_PERIOD: usize = 32;
@@ -28,7 +27,7 @@ const MAX_SPIN_RAD_S: f64 = 2e4;
 pub(crate) struct Member<'a> {
     pub(crate) rope: &'a RopeParams,
     pub(crate) path: &'a BasePath,
-    pub(crate) start: StartState,
+    pub(crate) start: RopeState,
     /// Point that its lead is to come near to, if it has one of its own (m, world).
     pub(crate) point_m: Option<[f64; 3]>,
 }
@@ -44,6 +43,7 @@ pub(crate) struct GroupTask<'a, const ALONE: bool> {
     pub(crate) frames: FrameTimes,
     pub(crate) watch: Watch,
     pub(crate) horizon_s: f64,
+    pub(crate) keeps_end: bool,
     pub(crate) single_precision: bool,
 }
 
@@ -83,10 +83,26 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
             Environment::new(contacts, &ropes)
         });
         if let Some(environment) = &mut environment {
+            for (lane, member) in self.members.iter().enumerate() {
+                environment.put_friction(lane, &member.start.friction_nm);
+            }
             environment.start(&links, &rope, &start);
         }
+        let mut ends: Vec<Option<RopeState>> = vec![None; count];
 
-        while clock.next_step(&mut rope, &mut restarts) {
+        loop {
+            let goes_on = clock.next_step(&mut rope, &mut restarts);
+            if self.keeps_end {
+                // A lane that has finished stands at its horizon until the others' next step.
+                let over = ends.iter_mut().enumerate();
+                for (lane, end) in over.filter(|(lane, e)| e.is_none() && clock.finished(*lane)) {
+                    let friction = environment.as_ref().map(|e| e.friction_nm(lane));
+                    *end = Some(end_of(&links, lane, friction.unwrap_or_default()));
+                }
+            }
+            if !goes_on {
+                break;
+            }
             if !restarts.is_empty() {
                 let mut which = V::splat(0.0);
                 for lane in &restarts {
@@ -132,8 +148,10 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
         health.check(&links, clock.scheme.h);
 
         let mut tracks = recorder.tracks.into_iter();
+        let mut ends = ends.into_iter();
         (0..count)
             .map(|lane| Rollout {
+                end: ends.next().flatten().filter(|_| health.alive[lane]),
                 nodes: tracks
                     .next()
                     .unwrap_or_else(|| NodeTrack::zeros(0, n + 1, false)),
@@ -234,6 +252,18 @@ fn start_links<V: Lanes>(members: &[Member]) -> Vec<Link<V>> {
     links
 }
 
+/// State of one lane.
+#[inline(always)]
+fn end_of<V: Lanes>(links: &[Link<V>], lane: usize, friction_nm: Vec<[f64; 3]>) -> RopeState {
+    let attitudes = links.iter().map(|link| link.q.get(lane));
+    let rates = links.iter().map(|link| link.w.get(lane));
+    RopeState {
+        attitudes: attitudes.collect(),
+        rates_rad_s: rates.collect(),
+        friction_nm,
+    }
+}
+
 /// Place and velocity of the lead relative to node 0.
 #[inline(always)]
 fn tip_from_clamp<V: Lanes>(links: &[Link<V>], link_length: V) -> [Vec3<V>; 2] {
@@ -260,7 +290,7 @@ mod tests {
         let members = ropes.iter().map(|rope| Member {
             rope,
             path,
-            start: StartState::at_rest(vec![[1.0, 0.0, 0.0, 0.0]; rope.links as usize]),
+            start: RopeState::at_rest(vec![[1.0, 0.0, 0.0, 0.0]; rope.links as usize]),
             point_m: None,
         });
         kernel.run(GroupTask::<true> {
@@ -274,6 +304,7 @@ mod tests {
             },
             watch: Watch::point([0.4, 0.0, 0.3]),
             horizon_s: HORIZON_S,
+            keeps_end: false,
             single_precision: kernel.is_single_precision(),
         })
     }

@@ -6,7 +6,7 @@ use crate::lanes::Precision;
 use crate::motion::AttachMotion;
 use crate::scene::{ContactSummary, DominoOutcome};
 use crate::watch::{Watch, Watched};
-use shared_types::RopeParams;
+use shared_types::{RopeParams, RopeState};
 
 /// Most steps of one rollout, and most frames; more is a mistake in step or horizon.
 const MAX_STEPS: f64 = 1e8;
@@ -38,6 +38,8 @@ pub struct SimOptions {
     pub watch: Watch,
     /// End of the simulation (s), from t = 0.
     pub horizon_s: f64,
+    /// Whether the ropes' states at the end are kept.
+    pub keeps_end: bool,
     /// Worker threads; results do not depend on it.
     pub threads: usize,
 }
@@ -53,6 +55,7 @@ impl SimOptions {
             frames: FrameTimes::NONE,
             watch: Watch::NOTHING,
             horizon_s,
+            keeps_end: false,
             threads: 1,
         }
     }
@@ -68,6 +71,8 @@ pub struct Candidate<'a> {
     pub motion: &'a dyn AttachMotion,
     /// How it swings at the start, which must be [`Start::Equilibrium`].
     pub sway: Sway,
+    /// State that it starts from, whatever [`SimOptions::start`] says.
+    pub state: Option<&'a RopeState>,
     /// Point that its lead's closest approach to is measured (m, world); without one
     /// [`Watch::point_m`], which also says where positions are resolved best.
     pub point_m: Option<[f64; 3]>,
@@ -99,6 +104,7 @@ impl<'a> Candidate<'a> {
             rope,
             motion,
             sway: Sway::NONE,
+            state: None,
             point_m: None,
         }
     }
@@ -107,6 +113,12 @@ impl<'a> Candidate<'a> {
     #[must_use]
     pub fn with_sway(self, sway: Sway) -> Self {
         Self { sway, ..self }
+    }
+
+    /// The same from a state of the rope, where there is one.
+    #[must_use]
+    pub fn from_state(self, state: Option<&'a RopeState>) -> Self {
+        Self { state, ..self }
     }
 
     /// The same, watching a point of its own (m, world) in the place of [`Watch::point_m`].
@@ -147,6 +159,9 @@ pub struct Rollout {
     pub contacts: Vec<ContactSummary>,
     /// What became of the scene's domino.
     pub domino: Option<DominoOutcome>,
+    /// The rope's state at the horizon, where [`SimOptions::keeps_end`] asked for it; none
+    /// after [`Outcome::Diverged`].
+    pub end: Option<RopeState>,
 }
 
 /// Checks options and candidates, by name.
@@ -174,6 +189,14 @@ pub(crate) fn check(candidates: &[Candidate], options: &SimOptions) -> Result<()
         if sway != Sway::NONE && options.start != Start::Equilibrium {
             let reason = "it swings at the start, but is to start straight; give it one start";
             return Err(SimulateError::of(index, reason));
+        }
+        if let Some(state) = candidate.state {
+            let fits = state.check(candidate.rope.links);
+            fits.map_err(|e| SimulateError::of(index, e))?;
+            if sway != Sway::NONE {
+                let reason = "it has a state and a swing at the start; give it one of them";
+                return Err(SimulateError::of(index, reason));
+            }
         }
         let ends_s = candidate.motion.duration_s();
         if !candidate.motion.holds_after_end() && ends_s < horizon_s - 1e-9 {

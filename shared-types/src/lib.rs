@@ -34,6 +34,8 @@ pub mod plan;
 pub mod rope;
 #[cfg(feature = "std")]
 pub mod rope_extras;
+#[cfg(feature = "std")]
+pub mod rope_state;
 pub mod time;
 
 #[cfg(feature = "std")]
@@ -49,6 +51,8 @@ pub use plan::{Condition, ErrorForecast, LimitedBy, Plan, Task, Verdict};
 pub use rope::{RopeEstimate, RopeParams};
 #[cfg(feature = "std")]
 pub use rope_extras::{AirDrag, BendingFriction, RopeExtras};
+#[cfg(feature = "std")]
+pub use rope_state::RopeState;
 pub use time::MonotonicNs;
 
 /// Version of this build, written into every result file.

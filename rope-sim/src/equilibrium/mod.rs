@@ -12,7 +12,7 @@ mod curved;
 use crate::kernel::GRAVITY_M_S2;
 use crate::rollout::Sway;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
-use shared_types::{RopeExtras, RopeParams};
+use shared_types::{RopeExtras, RopeParams, RopeState};
 
 /// Most Newton steps; ten are typical.
 const MAX_ITERATIONS: usize = 200;
@@ -20,26 +20,8 @@ const MAX_ITERATIONS: usize = 200;
 /// Turn of gravity between two equilibria whose difference gives a sway's shape (rad).
 const SWAY_STEP_RAD: f64 = 1e-4;
 
-/// A rope's state at the start.
-pub(crate) struct StartState {
-    /// Attitudes of the links, scalar first, link to world.
-    pub(crate) attitudes: Vec<[f64; 4]>,
-    /// Their angular velocities (rad/s, world); empty at rest.
-    pub(crate) rates_rad_s: Vec<[f64; 3]>,
-}
-
-impl StartState {
-    /// At rest.
-    pub(crate) fn at_rest(attitudes: Vec<[f64; 4]>) -> Self {
-        Self {
-            attitudes,
-            rates_rad_s: Vec::new(),
-        }
-    }
-}
-
 /// A rope that swings below an attach frame of attitude `r_attach`.
-pub(crate) fn swaying_links(rope: &RopeParams, r_attach: &Matrix3<f64>, sway: &Sway) -> StartState {
+pub(crate) fn swaying_links(rope: &RopeParams, r_attach: &Matrix3<f64>, sway: &Sway) -> RopeState {
     // Gravity turned is the attach frame turned back, seen from a turned world.
     let hanging = |angle_rad: [f64; 2]| -> Vec<UnitQuaternion<f64>> {
         let [x, y] = angle_rad;
@@ -64,9 +46,10 @@ pub(crate) fn swaying_links(rope: &RopeParams, r_attach: &Matrix3<f64>, sway: &S
             *rate += shape * sway.rate_rad_s[axis];
         }
     }
-    StartState {
+    RopeState {
         attitudes: here.iter().map(|q| [q.w, q.i, q.j, q.k]).collect(),
         rates_rad_s: rates.into_iter().map(Into::into).collect(),
+        friction_nm: Vec::new(),
     }
 }
 
