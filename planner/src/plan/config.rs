@@ -258,7 +258,7 @@ impl Default for PlanOptions {
             population: 60,
             generations: None,
             searches: 3,
-            library_candidates: 64,
+            library_candidates: 32,
             seed: 0,
             step_s: 5e-4,
             search_step_s: 1e-3,

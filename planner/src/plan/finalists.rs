@@ -116,7 +116,7 @@ impl Setup<'_> {
     }
 
     /// Throws observed to the end with all ropes, without those that let the arm collide.
-    fn judged(
+    pub(super) fn judged(
         &self,
         points: Vec<Point>,
         is_exact: bool,

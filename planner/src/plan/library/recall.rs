@@ -1,16 +1,17 @@
 //! A plan from the library, where it has a throw that is good enough.
 
+use super::super::finalists::Finalist;
 use super::super::search::Valued;
 use super::super::setup::{Count, Point, Setup};
 use super::super::{Dimensions, PlanError, PlanOptions, PlanRequest, ThrowOutcome};
 use super::ThrowLibrary;
-use arm_model::JointTrajectory;
+use nalgebra::Vector3;
 use shared_types::Plan;
 use shared_types::ipc::message::Progress;
 use std::ops::ControlFlow;
 
-/// Throws of the library that are compared over several ropes, and how many of them are polished.
-const COMPARED: usize = 4;
+/// Throws of the library that are compared over several ropes, and how many are polished of them.
+const COMPARED: usize = 6;
 const POLISHED: usize = 2;
 
 impl Setup<'_> {
@@ -54,26 +55,59 @@ impl Setup<'_> {
             return Ok(None);
         }
         let points = found.into_iter().map(|(_, point)| point).collect();
+        let best = quick.least_spread(points, count)?;
+        for x in quick.polish(best, count)? {
+            let point = (x.clone(), self.space.decode(&x)?);
+            // What the search's step hides is found out here.
+            let judged = self.judged(vec![point], true, count)?;
+            if let Some(best) = judged.into_iter().find(|f| self.is_met(f)) {
+                return self
+                    .written(best.trajectory, &best.outcome, count)
+                    .map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The throws whose tip comes to nearly the same place whatever is left open about the
+    /// rope, the best first: a miss that all ropes share is polished away.
+    fn least_spread(
+        &self,
+        points: Vec<Point>,
+        count: &mut Count,
+    ) -> Result<Vec<Vec<f64>>, PlanError> {
+        // One variant per parameter: the other goes the other way.
+        let ropes = &self.ropes[..=self.ropes.len() / 2];
+        let throws: Vec<_> = points
+            .iter()
+            .flat_map(|(_, t)| ropes.iter().map(move |rope| (rope, t)))
+            .collect();
+        count.add(throws.len());
+        let outcomes = self.judging.run(&throws)?;
+        let spread_m = |outcomes: &[ThrowOutcome]| {
+            let place = |o: &ThrowOutcome| o.watched.to_point.map(|c| Vector3::from(c.tip_m));
+            let own = place(outcomes.first()?)?;
+            let squares = outcomes
+                .iter()
+                .map(|o| Some((place(o)? - own).norm_squared()));
+            squares.sum::<Option<f64>>().map(f64::sqrt)
+        };
+        let spreads = outcomes.chunks(ropes.len()).map(spread_m);
+        let mut known: Vec<_> = spreads
+            .zip(points)
+            .filter_map(|(spread_m, (x, _))| Some((spread_m?, x)))
+            .collect();
+        known.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         let polished = POLISHED.min(self.task.config().robustness.polished);
-        let finalists = quick.compare(points, polished, count)?;
-        let Some(best) = finalists.into_iter().find(|f| quick.is_good(f)) else {
-            return Ok(None);
-        };
-        // What the search's step hides is found out here.
-        let outcome = self.exact_outcome(&best.trajectory, count)?;
-        let Some(outcome) = outcome.filter(|o| self.is_met(&best.trajectory, o)) else {
-            return Ok(None);
-        };
-        self.written(best.trajectory, &outcome, count).map(Some)
+        Ok(known.into_iter().take(polished).map(|(_, x)| x).collect())
     }
 
     /// Whether a throw meets its target, touches nothing and keeps every limit.
-    fn is_met(&self, trajectory: &JointTrajectory, outcome: &ThrowOutcome) -> bool {
+    fn is_met(&self, throw: &Finalist) -> bool {
         let request = self.request;
-        self.is_close(outcome)
-            && outcome.contacts.none()
-            && self.task.judge(&request.rope, outcome).success
-            && request.limits.worst_violation(trajectory).is_none()
+        self.is_good(throw)
+            && self.task.judge(&request.rope, &throw.outcome).success
+            && request.limits.worst_violation(&throw.trajectory).is_none()
     }
 
     /// The best of the library's throws with the rope planned for, best first, and what they are
