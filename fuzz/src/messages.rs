@@ -7,6 +7,7 @@ use planner::observation::Appearance;
 use planner::plan::PlanRequest;
 use planner::ropes::random_rope;
 use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
+use planner::history::ArmHistory;
 use planner::settle::SettleRequest;
 use planner::synthetic::side_camera;
 use serde::Serialize;
@@ -69,10 +70,12 @@ fn planner_requests() -> [PlannerRequest; 4] {
         PlannerRequest::Plan(Box::new(PlanRequest::new(goal, &rope, config.search))),
         PlannerRequest::Settle(Box::new(SettleRequest {
             rope,
-            times_s: vec![0.0],
-            q: vec![START_POSE],
-            start_s: 1.0,
-            start_q: START_POSE,
+            before: ArmHistory {
+                times_s: vec![0.0],
+                q: vec![START_POSE],
+                start_s: 1.0,
+                start_q: START_POSE,
+            },
             end_q: START_POSE,
             limits: Limits::default(),
             cell: Cell::default(),

@@ -31,6 +31,7 @@ pub mod arm_response;
 pub mod collide;
 mod config;
 pub mod features;
+pub mod history;
 pub mod identify;
 pub mod observation;
 mod out_of_range;

@@ -58,6 +58,25 @@ impl Default for WiggleConfig {
     }
 }
 
+/// Durations of oscillation, ramps and film of a short wiggle (s).
+const SHORT_S: [f64; 3] = [3.0, 1.5, 3.4];
+
+impl WiggleConfig {
+    /// The same oscillation for half as long, about another pose: what it tells about lengths
+    /// has a quarter more deviation, and about all else as little (`wag wiggle --evaluate`).
+    #[must_use]
+    pub fn short(&self, pose_rad: JointVector) -> Self {
+        let [duration_s, ramp_s, filmed_s] = SHORT_S;
+        Self {
+            pose_rad,
+            duration_s,
+            ramp_s,
+            filmed_s,
+            ..*self
+        }
+    }
+}
+
 /// Why there is no wiggle.
 #[derive(Debug, thiserror::Error)]
 pub enum WiggleError {

@@ -39,14 +39,6 @@ impl<V: Lanes> Environment<V> {
         }
     }
 
-    /// Moments of friction that a lane starts with (N m, world); empty for none.
-    #[inline(always)]
-    pub(crate) fn put_friction(&mut self, lane: usize, moments_nm: &[[f64; 3]]) {
-        if let Some(friction) = &mut self.extras.friction {
-            friction.put(lane, moments_nm);
-        }
-    }
-
     /// Moments of friction of a lane (N m, world); empty for none.
     #[inline(always)]
     pub(crate) fn friction_nm(&self, lane: usize) -> Vec<[f64; 3]> {
@@ -54,9 +46,21 @@ impl<V: Lanes> Environment<V> {
         friction.map_or_else(Vec::new, |friction| friction.moments_nm(lane))
     }
 
-    /// Looks around from where the rope starts.
+    /// Looks around from where the ropes start, with moments of friction (N m, world) that are
+    /// empty for none.
     #[inline(always)]
-    pub(crate) fn start(&mut self, links: &[Link<V>], rope: &RopeLanes<V>, attach: &BaseState<V>) {
+    pub(crate) fn start<'m>(
+        &mut self,
+        friction_nm: impl Iterator<Item = &'m [[f64; 3]]>,
+        links: &[Link<V>],
+        rope: &RopeLanes<V>,
+        attach: &BaseState<V>,
+    ) {
+        if let Some(friction) = &mut self.extras.friction {
+            for (lane, moments_nm) in friction_nm.enumerate() {
+                friction.put(lane, moments_nm);
+            }
+        }
         self.extras.start(links, &attach.dynamics);
         self.look(links, rope, attach);
     }

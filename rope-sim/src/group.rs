@@ -83,34 +83,19 @@ impl<const ALONE: bool> LaneTask for GroupTask<'_, ALONE> {
             Environment::new(contacts, &ropes)
         });
         if let Some(environment) = &mut environment {
-            for (lane, member) in self.members.iter().enumerate() {
-                environment.put_friction(lane, &member.start.friction_nm);
-            }
-            environment.start(&links, &rope, &start);
+            let friction_nm = self.members.iter().map(|m| &m.start.friction_nm[..]);
+            environment.start(friction_nm, &links, &rope, &start);
         }
-        let mut ends: Vec<Option<RopeState>> = vec![None; count];
+        let mut ends = vec![None; if self.keeps_end { count } else { 0 }];
 
         loop {
             let goes_on = clock.next_step(&mut rope, &mut restarts);
-            if self.keeps_end {
-                // A lane that has finished stands at its horizon until the others' next step.
-                let over = ends.iter_mut().enumerate();
-                for (lane, end) in over.filter(|(lane, e)| e.is_none() && clock.finished(*lane)) {
-                    let friction = environment.as_ref().map(|e| e.friction_nm(lane));
-                    *end = Some(end_of(&links, lane, friction.unwrap_or_default()));
-                }
-            }
+            keep_ends(&mut ends, &clock, &links, environment.as_ref());
             if !goes_on {
                 break;
             }
             if !restarts.is_empty() {
-                let mut which = V::splat(0.0);
-                for lane in &restarts {
-                    which.set(*lane, 1.0);
-                }
-                for link in &mut links {
-                    link.clear_memory(which);
-                }
+                clear_memory(&mut links, &restarts);
             }
             recorder.before_step(&clock, &links, rope.link_length);
             let base = clock.base();
@@ -252,15 +237,34 @@ fn start_links<V: Lanes>(members: &[Member]) -> Vec<Link<V>> {
     links
 }
 
-/// State of one lane.
+/// Forgets the past accelerations of some lanes.
 #[inline(always)]
-fn end_of<V: Lanes>(links: &[Link<V>], lane: usize, friction_nm: Vec<[f64; 3]>) -> RopeState {
-    let attitudes = links.iter().map(|link| link.q.get(lane));
-    let rates = links.iter().map(|link| link.w.get(lane));
-    RopeState {
-        attitudes: attitudes.collect(),
-        rates_rad_s: rates.collect(),
-        friction_nm,
+fn clear_memory<V: Lanes>(links: &mut [Link<V>], lanes: &[usize]) {
+    let mut which = V::splat(0.0);
+    for lane in lanes {
+        which.set(*lane, 1.0);
+    }
+    for link in links {
+        link.clear_memory(which);
+    }
+}
+
+/// Keeps the states of lanes that have just finished, of those in `ends`: they stand at their
+/// horizon until the others' next step.
+#[inline(always)]
+fn keep_ends<V: Lanes>(
+    ends: &mut [Option<RopeState>],
+    clock: &Clock<V>,
+    links: &[Link<V>],
+    environment: Option<&Environment<V>>,
+) {
+    let ends = ends.iter_mut().enumerate();
+    for (lane, end) in ends.filter(|(lane, end)| end.is_none() && clock.finished(*lane)) {
+        *end = Some(RopeState {
+            attitudes: links.iter().map(|link| link.q.get(lane)).collect(),
+            rates_rad_s: links.iter().map(|link| link.w.get(lane)).collect(),
+            friction_nm: environment.map_or_else(Vec::new, |e| e.friction_nm(lane)),
+        });
     }
 }
 

@@ -1,6 +1,7 @@
 //! A planned throw, as written to `plan.json` and sent to the controller.
 
 use crate::rope::RopeParams;
+use crate::rope_state::RopeState;
 use arm_model::cell::Cell;
 use arm_model::limits::Margin;
 use arm_model::trajectory::JointTrajectory;
@@ -141,6 +142,10 @@ pub struct Plan {
     pub aim: Option<Aim>,
     /// Rope the throw was planned for.
     pub rope: RopeParams,
+    /// State of the rope when the throw begins, if it still swings then; none for a rope that
+    /// hangs still.
+    #[serde(default)]
+    pub start: Option<RopeState>,
     /// Cell it was planned for; plans of older versions do not tell it.
     #[serde(default)]
     pub cell: Option<Cell>,

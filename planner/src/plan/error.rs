@@ -2,6 +2,7 @@
 
 use crate::OutOfRange;
 use crate::arm_response::FollowError;
+use crate::history::HistoryError;
 use arm_model::TrajectoryError;
 use cmaes::CmaError;
 use rope_sim::SimulateError;
@@ -58,6 +59,9 @@ pub enum PlanError {
     /// How the arm moves is not known.
     #[error(transparent)]
     Follow(#[from] FollowError),
+    /// Where the rope is when the throw begins is not known.
+    #[error(transparent)]
+    History(#[from] HistoryError),
     /// The best throw found within so many simulations still lets arm or pole collide.
     #[error(
         "every throw found within {0} simulations lets the arm or its pole collide: move the target away from the arm or search longer"

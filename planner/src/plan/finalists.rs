@@ -95,16 +95,16 @@ impl Setup<'_> {
         finalists: &mut Vec<Finalist>,
         count: &mut Count,
     ) -> Result<(), PlanError> {
-        let (rope, others) = (&self.request.rope, &self.ropes[1..]);
+        let (own, others) = (self.own(), self.at_start().skip(1));
         let seen = finalists.len().min(LOOKED_AT_AGAIN);
         let again = finalists[..seen].iter();
-        let mut throws: Vec<_> = again.map(|f| (rope, &f.trajectory)).collect();
-        throws.extend(others.iter().map(|rope| (rope, &finalists[0].trajectory)));
+        let mut throws: Vec<_> = again.map(|f| (own, &f.trajectory)).collect();
+        throws.extend(others.map(|rope| (rope, &finalists[0].trajectory)));
         let mut outcomes = self.judging.exact().run(&throws)?;
         count.add(throws.len());
         let of_others = outcomes.split_off(seen);
         for (finalist, outcome) in finalists.iter_mut().zip(&outcomes).skip(1) {
-            if !(outcome.finite && self.task.judge(rope, outcome).success) {
+            if !(outcome.finite && self.task.judge(own.rope, outcome).success) {
                 finalist.score += 1.0;
             }
         }
@@ -124,7 +124,7 @@ impl Setup<'_> {
     ) -> Result<Vec<Finalist>, PlanError> {
         let throws: Vec<_> = points
             .iter()
-            .flat_map(|(_, t)| self.ropes.iter().map(move |rope| (rope, t)))
+            .flat_map(|(_, t)| self.at_start().map(move |rope| (rope, t)))
             .collect();
         let exact = is_exact.then(|| self.judging.exact());
         let mut outcomes = exact.as_ref().unwrap_or(&self.judging).run(&throws)?;

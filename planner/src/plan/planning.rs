@@ -89,7 +89,7 @@ impl Setup<'_> {
         count: &mut Count,
     ) -> Result<Option<ThrowOutcome>, PlanError> {
         count.add(1);
-        let throws = [(&self.request.rope, trajectory)];
+        let throws = [(self.own(), trajectory)];
         let outcomes = self.judging.exact().run(&throws)?;
         Ok(outcomes.into_iter().find(|o| o.finite))
     }
@@ -116,6 +116,7 @@ impl Setup<'_> {
             target_m: self.task.target_m(),
             aim: None,
             rope: *rope,
+            start: self.states.first().cloned(),
             cell: Some(request.cell),
             predicted_error_m: self.task.error_m(outcome),
             predicted_time_s: outcome.closest_s,

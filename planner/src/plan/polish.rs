@@ -92,8 +92,8 @@ impl Setup<'_> {
         options: &SimOptions,
     ) -> Result<Vec<Option<ClosestApproach>>, PlanError> {
         let motions = self.motions(points)?;
-        let thrown = |m| Candidate::new(&self.request.rope, m);
-        let candidates: Vec<Candidate> = motions.iter().map(|m| thrown(m)).collect();
+        let own = self.own();
+        let candidates: Vec<Candidate> = motions.iter().map(|m| own.on(m)).collect();
         let rollouts = rope_sim::roll_out(&candidates, options)?;
         Ok(rollouts.into_iter().map(|r| r.watched.to_point).collect())
     }
@@ -128,7 +128,7 @@ impl Setup<'_> {
             .iter()
             .zip(perturbations.chunks(n))
             .map(|(motion, perturbations)| Family {
-                base: Candidate::new(&self.request.rope, motion),
+                base: self.own().on(motion),
                 perturbations,
             })
             .collect();

@@ -33,7 +33,7 @@ fn pole_end_reach_m(pole: &Pole) -> f64 {
 /// [`START_POSE`] with joint 1 turned to the target's bearing, so that joints 2,
 /// 4 and 6 move in the vertical plane through base axis and target.
 #[must_use]
-pub(super) fn start_pose_for(target_m: [f64; 3]) -> JointVector {
+pub fn start_pose_for(target_m: [f64; 3]) -> JointVector {
     let mut pose = START_POSE;
     pose[0] = target_m[1].atan2(target_m[0]);
     pose

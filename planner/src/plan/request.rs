@@ -3,6 +3,7 @@
 use super::{Drape, Lob, PlanOptions, PosteriorEnsemble, Strike, ThrowTask};
 use crate::OutOfRange;
 use crate::arm_response::Following;
+use crate::history::ArmHistory;
 use arm_model::{Cell, Limits};
 use serde::{Deserialize, Serialize};
 use shared_types::{RopeParams, Task};
@@ -66,6 +67,9 @@ pub struct PlanRequest {
     pub ensemble: PosteriorEnsemble,
     /// How the arm follows its setpoints; none for an arm that does exactly that.
     pub following: Option<Following>,
+    /// What the arm did before, where the rope still swings when the throw begins; none where
+    /// it hangs still.
+    pub before: Option<ArmHistory>,
 }
 
 impl PlanRequest {
@@ -81,6 +85,7 @@ impl PlanRequest {
             options,
             ensemble: PosteriorEnsemble::default(),
             following: None,
+            before: None,
         }
     }
 }

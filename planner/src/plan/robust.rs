@@ -2,8 +2,8 @@
 
 use super::finalists::Finalist;
 use super::search::{Search, Valued};
-use super::setup::{Count, Setup};
-use super::{PlanError, ThrowOutcome};
+use super::setup::{Count, Setup, at_start};
+use super::{PlanError, RopeAtStart, ThrowOutcome};
 use arm_model::kinematics::link_poses;
 use arm_model::{JOINTS, JointTrajectory, JointVector};
 use nalgebra::{Matrix3, Vector3};
@@ -87,9 +87,10 @@ impl Setup<'_> {
     /// Risk of each throw over the ropes of the ensemble.
     pub(super) fn risks(&self, trajectories: &[JointTrajectory]) -> Result<Vec<Valued>, PlanError> {
         let ropes = &self.request.ensemble.optimised;
+        let states = self.led_to(ropes)?;
         let throws: Vec<_> = trajectories
             .iter()
-            .flat_map(|t| ropes.iter().map(move |rope| (rope, t)))
+            .flat_map(|t| at_start(ropes, &states).map(move |rope| (rope, t)))
             .collect();
         let outcomes = self.simulator.run(&throws)?;
         let of_throw = |(t, outcomes): (_, &[ThrowOutcome])| {
@@ -138,7 +139,17 @@ impl Setup<'_> {
         trajectory: &JointTrajectory,
     ) -> Result<Option<ErrorForecast>, PlanError> {
         let ensemble = &self.request.ensemble;
-        let throws: Vec<_> = ensemble.forecast.iter().map(|r| (r, trajectory)).collect();
+        let states = self.may_lead_to(&ensemble.forecast)?;
+        // One that diverged on the way counts as one that cannot be thrown.
+        let known = |i: usize| states.get(i).is_none_or(Option::is_some);
+        let ropes = ensemble.forecast.iter().enumerate();
+        let ropes = ropes
+            .filter(|(i, _)| known(*i))
+            .map(|(i, rope)| RopeAtStart {
+                rope,
+                state: states.get(i).and_then(Option::as_ref),
+            });
+        let throws: Vec<_> = ropes.map(|rope| (rope, trajectory)).collect();
         let outcomes = if throws.is_empty() {
             Vec::new()
         } else {
@@ -159,7 +170,7 @@ impl Setup<'_> {
             }
         }
         errors.retain(|e| e.is_finite());
-        let drawn = throws.len() + ensemble.undrawn as usize;
+        let drawn = ensemble.forecast.len() + ensemble.undrawn as usize;
         let failed = drawn - errors.len() / DRAWS_PER_ROPE;
         Ok(error_forecast(
             errors,

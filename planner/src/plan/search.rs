@@ -142,8 +142,8 @@ impl Setup<'_> {
         &self,
         trajectories: &[JointTrajectory],
     ) -> Result<Vec<ThrowOutcome>, PlanError> {
-        let rope = &self.request.rope;
-        let throws: Vec<_> = trajectories.iter().map(|t| (rope, t)).collect();
+        let own = self.own();
+        let throws: Vec<_> = trajectories.iter().map(|t| (own, t)).collect();
         self.searching.run(&throws)
     }
 

@@ -4,13 +4,15 @@ use super::pole_pose::reach_pose;
 use super::screen::Screen;
 use super::waypoints::{WAYPOINTS, WaypointSpace};
 use super::{
-    PlanError, PlanRequest, ThrowOutcome, ThrowSimulator, ThrowTask, simulator_for, start_pose_for,
+    PlanError, PlanRequest, RopeAtStart, ThrowOutcome, ThrowSimulator, ThrowTask, simulator_for,
+    start_pose_for,
 };
 use crate::collide::Block;
+use crate::history::{ArmHistory, HistoryError, Prelude};
 use arm_model::geometry::Capsule;
-use arm_model::{JointTrajectory, JointVector};
+use arm_model::{Cell, JointTrajectory, JointVector};
 use nalgebra::Vector3;
-use shared_types::RopeParams;
+use shared_types::{RopeParams, RopeState};
 
 /// A point of the search's space with its trajectory.
 pub(super) type Point = (Vec<f64>, JointTrajectory);
@@ -30,6 +32,9 @@ pub(super) struct Setup<'a> {
     pub(super) start: Vec<f64>,
     /// The rope planned for, then others that finalists are compared with.
     pub(super) ropes: Vec<RopeParams>,
+    /// Their states when the throw begins; empty where they hang still.
+    pub(super) states: Vec<RopeState>,
+    prelude: Option<Prelude>,
 }
 
 /// Most by which a throw of a rope that curls is turned away from the target's bearing
@@ -120,10 +125,14 @@ impl<'a> Setup<'a> {
             tail_s: config.observed_s,
             ..simulator.clone()
         };
-        Ok(Self {
+        let before = request.before.as_ref();
+        let prelude = before.map(|history| prelude_of(history, &space.start, &request.cell));
+        let mut setup = Self {
             std_dev: space.std_dev(&JointVector(config.std_dev_rad)),
             start: start_point(task, request, &space, &screen),
             ropes: config.robustness.variants(&request.rope),
+            states: Vec::new(),
+            prelude: prelude.transpose()?,
             space,
             screen,
             simulator,
@@ -131,7 +140,43 @@ impl<'a> Setup<'a> {
             judging,
             task,
             request,
-        })
+        };
+        setup.states = setup.led_to(&setup.ropes)?;
+        Ok(setup)
+    }
+
+    /// The rope planned for and the others, as the throw begins.
+    pub(super) fn at_start(&self) -> impl Iterator<Item = RopeAtStart<'_>> + Clone {
+        at_start(&self.ropes, &self.states)
+    }
+
+    /// The rope planned for, as the throw begins.
+    pub(super) fn own(&self) -> RopeAtStart<'_> {
+        RopeAtStart {
+            rope: &self.request.rope,
+            state: self.states.first(),
+        }
+    }
+
+    /// Where what the arm did before leads some ropes; nothing where they hang still.
+    ///
+    /// # Errors
+    /// What the simulator refuses; the simulation of one diverges.
+    pub(super) fn led_to(&self, ropes: &[RopeParams]) -> Result<Vec<RopeState>, PlanError> {
+        let states = self.may_lead_to(ropes)?.into_iter();
+        let states = states.collect::<Option<_>>();
+        Ok(states.ok_or(HistoryError::Diverged)?)
+    }
+
+    /// The same; none for a rope whose simulation diverges.
+    pub(super) fn may_lead_to(
+        &self,
+        ropes: &[RopeParams],
+    ) -> Result<Vec<Option<RopeState>>, PlanError> {
+        let Some(prelude) = &self.prelude else {
+            return Ok(Vec::new());
+        };
+        Ok(prelude.lead_to(ropes, self.request.options.threads)?)
     }
 
     /// Fitness `f(τ)` of one simulated throw.
@@ -152,6 +197,33 @@ impl<'a> Setup<'a> {
             + weights.speed_excess_per_rad_s * self.screen.speed_excess_rad_s(trajectory)
             + weights.contacts(&outcome.contacts)
     }
+}
+
+/// Ropes with their states, if they have any.
+pub(super) fn at_start<'a>(
+    ropes: &'a [RopeParams],
+    states: &'a [RopeState],
+) -> impl Iterator<Item = RopeAtStart<'a>> + Clone {
+    let numbered = ropes.iter().enumerate();
+    numbered.map(|(i, rope)| RopeAtStart {
+        rope,
+        state: states.get(i),
+    })
+}
+
+/// What the arm did before a throw from the pose `start`.
+fn prelude_of(
+    history: &ArmHistory,
+    start: &JointVector,
+    cell: &Cell,
+) -> Result<Prelude, HistoryError> {
+    const TOLERANCE_RAD: f64 = 1e-6;
+    if (history.start_q - *start).max_abs() > TOLERANCE_RAD {
+        return Err(HistoryError::Start(
+            "the arm stands elsewhere than this throw begins: wiggle in its start pose".to_owned(),
+        ));
+    }
+    Prelude::new(history, cell)
 }
 
 /// The task's warm start, as far from rest as the arm may go; rest without one.

@@ -12,7 +12,7 @@ use rope_sim::{
     Candidate, ContactSummary, DominoOutcome, FrameTimes, Outcome, PlannedArm, Precision, Rollout,
     Scene, SimOptions, Watch, Watched, roll_out_in,
 };
-use shared_types::RopeParams;
+use shared_types::{RopeParams, RopeState};
 
 /// What one simulated throw did.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -40,6 +40,29 @@ pub struct ThrowOutcome {
     pub point_m: [f64; 3],
     /// Ends of the watched segment (m).
     pub segment_m: [[f64; 3]; 2],
+}
+
+/// A rope as a throw begins.
+#[derive(Debug, Clone, Copy)]
+pub struct RopeAtStart<'a> {
+    /// The rope.
+    pub rope: &'a RopeParams,
+    /// Its state; none for one that hangs still.
+    pub state: Option<&'a RopeState>,
+}
+
+impl<'a> RopeAtStart<'a> {
+    /// The rope on a motion.
+    pub(super) fn on(self, motion: &'a PlannedArm) -> Candidate<'a> {
+        Candidate::new(self.rope, motion).from_state(self.state)
+    }
+}
+
+impl<'a> From<&'a RopeParams> for RopeAtStart<'a> {
+    /// Hanging still.
+    fn from(rope: &'a RopeParams) -> Self {
+        Self { rope, state: None }
+    }
 }
 
 /// How throws of one task are simulated.
@@ -111,9 +134,20 @@ impl ThrowSimulator {
     ///
     /// # Errors
     /// What the rope simulator refuses.
-    pub fn run(
+    pub fn run<'a, R: Into<RopeAtStart<'a>> + Copy>(
         &self,
-        throws: &[(&RopeParams, &JointTrajectory)],
+        throws: &[(R, &JointTrajectory)],
+    ) -> Result<Vec<ThrowOutcome>, PlanError> {
+        let throws: Vec<_> = throws
+            .iter()
+            .map(|(rope, t)| ((*rope).into(), *t))
+            .collect();
+        self.run_from(&throws)
+    }
+
+    fn run_from(
+        &self,
+        throws: &[(RopeAtStart<'_>, &JointTrajectory)],
     ) -> Result<Vec<ThrowOutcome>, PlanError> {
         let arms = throws
             .iter()
@@ -124,7 +158,7 @@ impl ThrowSimulator {
         let candidates: Vec<Candidate<'_>> = throws
             .iter()
             .zip(&arms)
-            .map(|((rope, _), arm)| Candidate::new(rope, arm))
+            .map(|((rope, _), arm)| rope.on(arm))
             .collect();
         let looked_s = motion_s + self.contact_tail_s.min(self.tail_s);
         let count = (looked_s / self.contact_period_s).floor() as usize + 1;
@@ -140,7 +174,7 @@ impl ThrowSimulator {
             &jobs,
             self.threads,
             |(((rope, _), arm), rollout)| {
-                self.outcome(rope, arm.trajectory(), rollout, options.horizon_s)
+                self.outcome(rope.rope, arm.trajectory(), rollout, options.horizon_s)
             },
         ))
     }

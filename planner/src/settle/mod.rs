@@ -8,7 +8,6 @@
 //! end: command shaping for zero residual vibration, with the identified
 //! nonlinear model in the place of a list of frequencies.
 
-mod chain;
 mod descent;
 mod request;
 mod residual;
@@ -18,8 +17,8 @@ mod tests;
 
 pub use request::{SettleConfig, SettleError, SettleMove, SettleRequest};
 
+use crate::history::Prelude;
 use arm_model::JointTrajectory;
-use chain::Prelude;
 use descent::LeastResidual;
 use residual::{Residual, ResidualSimulator};
 use shape::MoveShape;
@@ -43,7 +42,7 @@ pub fn settle(
     let config = &request.config;
     config.check()?;
     request.rope.validate()?;
-    let prelude = Prelude::new(request)?;
+    let prelude = Prelude::new(&request.before, &request.cell)?;
     let mut best = Err(SettleError::NoDuration);
     for duration_s in &config.durations_s {
         match settle_within(request, &prelude, *duration_s, progress) {
@@ -76,7 +75,12 @@ fn settle_within(
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<SettleMove, SettleError> {
     let config = &request.config;
-    let shape = MoveShape::new(request.start_q, request.end_q, duration_s, config.knot_s);
+    let shape = MoveShape::new(
+        request.before.start_q,
+        request.end_q,
+        duration_s,
+        config.knot_s,
+    );
     let plain = shape.trajectory(&shape.no_offsets())?;
     if let Some(margin) = request.limits.worst_violation(&plain) {
         return Err(SettleError::BreaksLimit(margin.describe()));

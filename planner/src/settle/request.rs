@@ -1,9 +1,10 @@
 //! What a settling move is planned from, what comes of it, and why there is none.
 
 use crate::OutOfRange;
+use crate::history::{ArmHistory, HistoryError};
 use arm_model::{Cell, JointTrajectory, JointVector, Limits, TrajectoryError};
+use rope_sim::SimulateError;
 use rope_sim::sensitivity::SensitivityError;
-use rope_sim::{MotionError, SimulateError};
 use serde::{Deserialize, Serialize};
 use shared_types::RopeParams;
 use shared_types::rope::RopeError;
@@ -13,14 +14,8 @@ use shared_types::rope::RopeError;
 pub struct SettleRequest {
     /// The rope, as identified.
     pub rope: RopeParams,
-    /// Times of the measured joints (s); the rope hangs still at time 0.
-    pub times_s: Vec<f64>,
-    /// Measured joints (rad). After the last one the arm holds.
-    pub q: Vec<JointVector>,
-    /// When the arm will begin to move (s).
-    pub start_s: f64,
-    /// Commanded pose the arm holds until then (rad).
-    pub start_q: JointVector,
+    /// What the arm did before.
+    pub before: ArmHistory,
     /// Commanded pose at the end (rad).
     pub end_q: JointVector,
     /// What the arm may do.
@@ -133,12 +128,9 @@ pub enum SettleError {
     /// The rope's parameters are not physical.
     #[error(transparent)]
     Rope(#[from] RopeError),
-    /// The measured joints make no motion.
-    #[error("measured joints: {0}")]
-    Joints(#[from] MotionError),
-    /// The arm is not known to stand where and when the move begins.
-    #[error("{0}")]
-    Start(String),
+    /// What the arm did before leads nowhere.
+    #[error(transparent)]
+    History(#[from] HistoryError),
     /// The knots make no trajectory.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),

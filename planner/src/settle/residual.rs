@@ -1,8 +1,8 @@
 //! How much the rope still swings after a move, and how near it comes to the arm.
 
-use super::chain::Prelude;
 use super::request::SettleError;
 use crate::collide::{ArmShape, RopeShape, rope_clearance_m, tool_contacts};
+use crate::history::Prelude;
 use arm_model::JointTrajectory;
 use nalgebra::Vector3;
 use rope_sim::sensitivity::{Family, Perturbation, sensitivity};

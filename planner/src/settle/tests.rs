@@ -1,4 +1,5 @@
 use super::*;
+use crate::history::ArmHistory;
 use crate::ropes::random_rope;
 use crate::wiggle::{WiggleConfig, wiggle};
 use arm_model::joint::START_POSE;
@@ -56,10 +57,12 @@ fn request(index: usize) -> SettleRequest {
             joint_stiffness_nm_per_rad: k,
             ..random_rope(index as u64)
         },
-        times_s,
-        q,
-        start_s: before.duration_s() + 1.5,
-        start_q: START_POSE,
+        before: ArmHistory {
+            times_s,
+            q,
+            start_s: before.duration_s() + 1.5,
+            start_q: START_POSE,
+        },
         end_q: turned(turn_deg),
         limits: Limits::default(),
         cell: Cell::default(),
@@ -72,12 +75,12 @@ fn request(index: usize) -> SettleRequest {
 /// motion, in double precision and half the step.
 fn settled_residual_m(request: &SettleRequest, trajectory: &JointTrajectory) -> f64 {
     let before = wiggled();
-    let end_s = request.start_s + trajectory.duration_s();
+    let end_s = request.before.start_s + trajectory.duration_s();
     let (times_s, q) = samples(end_s + 0.1, |t| {
-        if t < request.start_s {
+        if t < request.before.start_s {
             before.state_at(t).q
         } else {
-            trajectory.state_at(t - request.start_s).q
+            trajectory.state_at(t - request.before.start_s).q
         }
     });
     let arm = MeasuredArm::new(&times_s, &q, Pole::default()).unwrap();
@@ -110,10 +113,10 @@ fn ropes_from_soft_to_stiff_hang_still_after_the_move() {
         let true_m = settled_residual_m(&request, &found.trajectory);
         assert!(found.residual_m < 5e-3 && true_m < 6e-3, "{seed}: {true_m}");
         assert!(request.limits.worst_violation(&found.trajectory).is_none());
-        assert_eq!(found.trajectory.start(), request.start_q);
+        assert_eq!(found.trajectory.start(), request.before.start_q);
         assert_eq!(found.trajectory.end(), request.end_q);
         let duration_s = found.trajectory.duration_s();
-        let plain = MoveShape::new(request.start_q, request.end_q, duration_s, 0.44);
+        let plain = MoveShape::new(request.before.start_q, request.end_q, duration_s, 0.44);
         let plain = plain.trajectory(&plain.no_offsets()).unwrap();
         let plain_m = settled_residual_m(&request, &plain);
         // Judged at 30 Hz over a little less than here.
@@ -190,14 +193,14 @@ fn a_wrong_start_is_refused_by_name() {
     let good = request(4);
     type Change = fn(&mut SettleRequest);
     let cases: [(Change, &str); 10] = [
-        (|r| r.start_s = 5.0, "would begin 5.000 s"),
-        (|r| r.start_q[3] += 0.05, "joint 4 stands"),
-        (|r| r.q[7][2] = f64::NAN, "measured joints: "),
+        (|r| r.before.start_s = 5.0, "would begin 5.000 s"),
+        (|r| r.before.start_q[3] += 0.05, "joint 4 stands"),
+        (|r| r.before.q[7][2] = f64::NAN, "measured joints: "),
         (|r| r.rope.length_m = -1.0, "`length_m`"),
         (|r| r.config.knot_s = 0.0, "`knot_s`"),
         (|r| r.config.offset_cost_m_per_rad = 10.0, "below 10 m/rad"),
         (|r| r.config.clearance_m = 1.0, "`clearance_m`"),
-        (|r| r.start_s = 1e6, "`start_s`"),
+        (|r| r.before.start_s = 1e6, "`start_s`"),
         (|r| r.config.durations_s = vec![3.5; 1000], "`durations_s`"),
         (|r| r.config.iterations = usize::MAX, "`iterations`"),
     ];
@@ -223,12 +226,12 @@ fn a_caller_that_leaves_ends_the_search() {
 #[test]
 fn the_arm_keeps_its_standing_error_through_the_move() {
     let mut request = request(0);
-    request.start_q[5] -= 0.004;
-    let prelude = Prelude::new(&request).unwrap();
-    let shape = MoveShape::new(request.start_q, request.end_q, 3.5, 0.44);
+    request.before.start_q[5] -= 0.004;
+    let prelude = Prelude::new(&request.before, &request.cell).unwrap();
+    let shape = MoveShape::new(request.before.start_q, request.end_q, 3.5, 0.44);
     let trajectory = shape.trajectory(&shape.no_offsets()).unwrap();
     let arm = prelude.then(&trajectory);
-    let start_s = request.start_s;
+    let start_s = request.before.start_s;
     let (before, after) = (arm.at(start_s - 1e-6), arm.at(start_s + 1e-6));
     assert!((before.p_m - after.p_m).norm() < 1e-9);
     let mut end_q = request.end_q;

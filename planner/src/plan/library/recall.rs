@@ -38,9 +38,11 @@ impl Setup<'_> {
         };
         let request = PlanRequest {
             options,
+            before: None,
             ..self.request.clone()
         };
-        let quick = Setup::new(self.task, &request)?;
+        let mut quick = Setup::new(self.task, &request)?;
+        quick.states.clone_from(&self.states);
         let found = quick.recall(library, count)?;
         let Some((nearest, _)) = found.first() else {
             return Ok(None);
@@ -77,10 +79,10 @@ impl Setup<'_> {
         count: &mut Count,
     ) -> Result<Vec<Vec<f64>>, PlanError> {
         // One variant per parameter: the other goes the other way.
-        let ropes = &self.ropes[..=self.ropes.len() / 2];
+        let ropes = self.at_start().take(self.ropes.len() / 2 + 1);
         let throws: Vec<_> = points
             .iter()
-            .flat_map(|(_, t)| ropes.iter().map(move |rope| (rope, t)))
+            .flat_map(|(_, t)| ropes.clone().map(move |rope| (rope, t)))
             .collect();
         count.add(throws.len());
         let outcomes = self.judging.run(&throws)?;
@@ -92,7 +94,7 @@ impl Setup<'_> {
                 .map(|o| Some((place(o)? - own).norm_squared()));
             squares.sum::<Option<f64>>().map(f64::sqrt)
         };
-        let spreads = outcomes.chunks(ropes.len()).map(spread_m);
+        let spreads = outcomes.chunks(ropes.count()).map(spread_m);
         let mut known: Vec<_> = spreads
             .zip(points)
             .filter_map(|(spread_m, (x, _))| Some((spread_m?, x)))
