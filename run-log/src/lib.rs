@@ -37,6 +37,7 @@ mod margins;
 mod mcap_file;
 mod page;
 mod run;
+mod run_outcome;
 mod run_record;
 mod run_score;
 mod tracked_film;
@@ -57,6 +58,7 @@ pub use mcap_file::{
 };
 pub use page::show;
 pub use run::{CellHere, NoRecording, Recording, Run};
+pub use run_outcome::{loop_table, outcome, parameter_table};
 pub use run_record::{Film, MotionSpan, RunRecord, Settled, StageTimes, Tracked};
 pub use run_score::{Colours, Kept, NamedFilm, ScoredBy, UNNAMED_COLOURS, require_same_target};
 pub use tracked_film::TrackedFilm;

@@ -40,6 +40,24 @@ pub struct StageTimes {
     pub score_s: f64,
 }
 
+impl StageTimes {
+    /// Each by its name, in their order (s).
+    #[must_use]
+    pub fn named(&self) -> [(&'static str, f64); 9] {
+        [
+            ("start", self.start_s),
+            ("bring-up", self.bringup_s),
+            ("wiggle", self.wiggle_s),
+            ("track", self.track_s),
+            ("identify", self.identify_s),
+            ("plan", self.plan_s),
+            ("settle", self.settle_s),
+            ("throw", self.throw_s),
+            ("score", self.score_s),
+        ]
+    }
+}
+
 /// A film and its motion.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Film {
@@ -52,6 +70,14 @@ pub struct Film {
     /// When the motion ran.
     #[serde(skip)]
     pub motion: MotionSpan,
+}
+
+impl Film {
+    /// One line about it.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        format!("{} frames, {} dropped", self.frames, self.dropped)
+    }
 }
 
 /// How a film was tracked.
@@ -113,6 +139,11 @@ pub struct RunRecord {
     pub wall_s: f64,
     /// Wall time of each stage.
     pub stages: StageTimes,
+    /// From the arm being enabled to the tip's closest approach as planned, of a throw made in the
+    /// same run (s).
+    pub enabled_to_strike_s: Option<f64>,
+    /// How much later than planned a throw out of a swing began (s).
+    pub throw_late_s: Option<f64>,
     wiggle: Option<Film>,
     /// When the throw ran.
     throw: Option<MotionSpan>,

@@ -9,7 +9,7 @@ const MISS_WARN_M: f64 = 0.01;
 const MISS_MAX_M: f64 = 0.05;
 
 /// Upper end of a forecast above which the throw is pointed out as uncertain (m).
-const FORECAST_WARN_M: f64 = 0.015;
+pub const FORECAST_WARN_M: f64 = 0.015;
 
 /// What is wrong with a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]

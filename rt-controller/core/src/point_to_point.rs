@@ -68,6 +68,21 @@ pub fn plan_move(
     Err(MoveError::new(broken, message))
 }
 
+/// The speed fraction at which a move lasts `duration_s`, but for what the limits allow at most.
+///
+/// # Errors
+/// As [`plan_move`].
+pub fn fraction_that_lasts(
+    from: &JointVector,
+    to: &JointVector,
+    duration_s: f64,
+    limits: &Limits,
+) -> Result<f64, MoveError> {
+    const LEAST: f64 = 1e-3;
+    let fastest_s = plan_move(from, to, 1.0, limits)?.duration_s();
+    Ok((fastest_s / duration_s).clamp(LEAST, 1.0))
+}
+
 /// Runs the motion through the limiter at the wire's rate.
 ///
 /// # Errors

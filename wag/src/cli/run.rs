@@ -53,6 +53,10 @@ pub struct RunArgs {
     /// Plan for this many ropes drawn from the posterior of identification.
     #[arg(long, default_value_t = 0, value_name = "K")]
     pub robust: usize,
+    /// Strike out of the swing that a short wiggle leaves, without calming the rope: half the
+    /// time. The rope is calmed where the forecast is too wide, with a warning.
+    #[arg(long, conflicts_with_all = ["from", "again", "robust"])]
+    pub fast: bool,
     /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
     pub accept_unconfirmed: bool,
@@ -115,6 +119,10 @@ pub struct DemoArgs {
     /// file. Domain, seed, ports and target are the demo's own.
     #[arg(long, value_name = "FILE")]
     pub rig_config: Option<PathBuf>,
+    /// Strike out of the swing that a short wiggle leaves, without calming the rope: half the
+    /// time. The rope is calmed where the forecast is too wide, with a warning.
+    #[arg(long, conflicts_with = "again")]
+    pub fast: bool,
     /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
     pub accept_unconfirmed: bool,

@@ -1,7 +1,7 @@
 //! `wag demo`: one throw from start to end on a simulated rig that is started for it.
 
 use super::plan_again::{LastThrow, check_thrown};
-use super::run::{Entry, Run, Setup, check_target, in_folder};
+use super::run::{Entry, Run, Setup, check_target, in_folder, short_wiggle};
 use crate::cli::DemoArgs;
 use crate::config;
 use crate::pipeline::{self, FramesFrom, RunFolder};
@@ -20,7 +20,7 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
     let rig_config = rig_config.as_ref().or(args.rig_config.as_ref());
     let rig: RigConfig = config::here(rig_config.map(PathBuf::as_path)).or_input()?;
     let seed = last.as_ref().map_or(args.seed, |_| rig.seed);
-    let settings = config::here::<PlannerConfig>(None)
+    let mut settings = config::here::<PlannerConfig>(None)
         .or_input()?
         .with_identify_seed(seed);
     let limits: Limits = config::here(None).or_input()?;
@@ -29,6 +29,9 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
         (None, Some(target)) => target.0,
         (None, None) => random_target(args.task, seed),
     };
+    if args.fast {
+        settings.wiggle = short_wiggle(&settings, args.task, target_m)?;
+    }
     // Refused before anything starts, whatever rope turns out to be there.
     check_target(target_m, &settings)?;
     watch_interrupts().or_failed()?;
@@ -67,6 +70,7 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
             accept_unconfirmed: args.accept_unconfirmed,
             robust: 0,
             keeps_films: false,
+            fast: args.fast,
         };
         Run::start(&folder, session, record, setup, &stage)?.go(entry)
     })

@@ -9,8 +9,7 @@ use crate::cli::IdentifyArgs;
 use crate::config;
 use anyhow::Context;
 use camera_ingest::load_camera;
-use cli_output::{Failure, OrInput, Outcome, Stage, table};
-use comfy_table::Table;
+use cli_output::{Failure, OrInput, Outcome, Stage};
 use planner::PlannerConfig;
 use planner::identify::{IdentifyOptions, Method};
 use planner::observation::{Appearance, Observation, ObservedPoints};
@@ -173,39 +172,6 @@ fn observe(args: &IdentifyArgs, method: Method) -> Outcome<Observed> {
     })
 }
 
-/// What was identified, beside the truth where a rig tells it.
-pub fn parameter_table(estimate: &RopeEstimate, truth: Option<&RopeParams>) -> Table {
-    let found = estimate.params.to_array();
-    let number = |i: usize, value| table::number(value, estimate.std_dev[i]);
-    let cells = |i: usize| {
-        let [low, high] = estimate.posterior.interval_90[i];
-        let interval = estimate.std_dev[i].map_or_else(
-            || "not identifiable".to_owned(),
-            |_| format!("{} to {}", number(i, low), number(i, high)),
-        );
-        let (range, found) = (&RANGES[i], number(i, found[i]));
-        let [name, unit] = [range.label, range.unit].map(str::to_owned);
-        [name, found, interval, unit]
-    };
-    let rows = 0..RANGES.len();
-    let Some(truth) = truth.map(RopeParams::to_array) else {
-        let header = ["parameter", "identified", "90 % interval", "unit"];
-        return table::numbers(header, 1, rows.map(cells));
-    };
-    let header = [
-        "parameter",
-        "identified",
-        "90 % interval",
-        "hidden truth",
-        "unit",
-    ];
-    let beside = rows.map(|i| {
-        let [name, value, interval, unit] = cells(i);
-        [name, value, interval, number(i, truth[i]), unit]
-    });
-    table::numbers(header, 1, beside)
-}
-
 /// What the film leaves open, in words: a parameter, or a combination of some.
 fn in_words(ambiguity: &Ambiguity) -> String {
     const PART: f64 = 0.3;
@@ -298,7 +264,7 @@ pub fn run(args: &IdentifyArgs) -> Outcome<Option<Value>> {
     files::write_rope_estimate(&args.out, &estimate, &observed.track.unconfirmed).or_failed()?;
     println!(
         "{}\nresidual {:.2} px -> `{}`",
-        parameter_table(&estimate, None),
+        run_log::parameter_table(&estimate, None),
         estimate.residual_px,
         args.out.display()
     );

@@ -110,19 +110,21 @@ pub fn run(kind: Task, args: &PlanArgs) -> Outcome<Option<Value>> {
     cli_output::watch_interrupts().or_failed()?;
     let stage = Stage::begin("plan");
     let request = PlanRequest {
-        goal: config.goal(kind, args.target.0),
-        rope: known.params,
         limits: limits.clone(),
         cell: config.cell,
-        options: PlanOptions {
-            seed: args.seed,
-            segment_stretch_max: args
-                .segment_stretch
-                .unwrap_or(config.search.segment_stretch_max),
-            ..config.search
-        },
         ensemble,
         following,
+        ..PlanRequest::new(
+            config.goal(kind, args.target.0),
+            &known.params,
+            PlanOptions {
+                seed: args.seed,
+                segment_stretch_max: args
+                    .segment_stretch
+                    .unwrap_or(config.search.segment_stretch_max),
+                ..config.search
+            },
+        )
     };
     let mut plan = planner::plan(&request, &mut |p| stage.go_on(&p)).map_err(classify)?;
     plan.unconfirmed = known.unconfirmed;

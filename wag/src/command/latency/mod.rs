@@ -9,8 +9,6 @@ mod measure;
 mod show;
 mod stops;
 
-pub use show::loop_table;
-
 use crate::cli::LatencyArgs;
 use crate::config::RESPONSE_FILE;
 use anyhow::Context;

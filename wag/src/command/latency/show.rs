@@ -8,26 +8,9 @@ use cli_output::table;
 use comfy_table::Table;
 use planner::arm_response::delay::TargetDelay;
 use rt_controller::bridge::Latencies;
+use run_log::loop_table;
 use serde_json::{Value, json};
-use shared_types::ipc::message::LatencyReport;
 use std::path::PathBuf;
-
-/// Times within the control loop.
-pub fn loop_table(report: &LatencyReport) -> Table {
-    let rows = [
-        ("wake-up latency", report.wake),
-        ("compute", report.compute),
-        ("wake-up to sent", report.send),
-        ("reply round trip", report.reply),
-    ]
-    .map(|(what, p)| {
-        let [p50, p99, p999, max] =
-            [p.p50_us, p.p99_us, p.p999_us, p.max_us].map(|us| format!("{us:.0}"));
-        [what.to_owned(), p50, p99, p999, max, p.count.to_string()]
-    });
-    let header = ["control loop (µs)", "p50", "p99", "p99.9", "max", "count"];
-    table::numbers(header, 0, rows)
-}
 
 /// A value with its interval, in some unit and decimals.
 fn with_interval(e: Estimate, scale: f64, decimals: usize) -> String {

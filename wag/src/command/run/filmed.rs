@@ -1,7 +1,6 @@
 //! The two motions of a run that are filmed, and what the film of the throw tells.
 
 use super::stages::{Run, UNNAMED_COLOURS, answered};
-use super::summary;
 use crate::command::motion;
 use crate::pipeline::{self, execute};
 use anyhow::{Context, anyhow, bail, ensure};
@@ -17,7 +16,7 @@ use shared_types::ipc::message::{CameraEvent, CameraRequest, RigEvent, RigReques
 use shared_types::{MonotonicNs, OperatingMode, Plan, Task, Verdict};
 use std::time::Duration;
 
-/// Frames of a wiggle (paper: 400 at 60 Hz).
+/// Most frames of a wiggle (paper: 400 at 60 Hz).
 const WIGGLE_FRAMES: u32 = 400;
 /// Frames of a strike: two and a half seconds.
 const STRIKE_FRAMES: u32 = 150;
@@ -25,6 +24,8 @@ const STRIKE_FRAMES: u32 = 150;
 const AFTER_STRIKE_S: f64 = 0.6;
 /// Time for putting a board or a wall in its place.
 const PLACED_WITHIN: Duration = Duration::from_secs(900);
+/// Longest a film takes of which nothing came (s).
+const FILMED_WITHIN_S: f64 = 15.0;
 /// From the first frame of a film to the motion's begin, at most (s).
 const BEFORE_THROW_S: f64 = 0.4;
 
@@ -32,13 +33,14 @@ impl Run<'_> {
     /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
     /// finished whatever becomes of the film, of both eyes. A wiggle is made for the film's
     /// sake, of which the left eye is enough, and is braked when the process that keeps it ends.
+    /// What is to begin at an instant is not streamed, and there is no film, if that is over.
     fn film(
         &mut self,
         frames: u32,
         trajectory: &JointTrajectory,
-        throw: bool,
+        (throw, begin): (bool, Option<MonotonicNs>),
         stage: &Stage,
-    ) -> anyhow::Result<Film> {
+    ) -> anyhow::Result<Option<Film>> {
         let request = CameraRequest::Record {
             frames,
             both_images: throw || self.setup.keeps_films,
@@ -48,6 +50,12 @@ impl Run<'_> {
             CameraEvent::Recording { first_stamp_ns } => first_stamp_ns,
             other => bail!("the camera process answered a recording with {other:?}"),
         };
+        if let Some(begin) = begin
+            && !(self.wait_for(begin)? && self.session.is_held())
+        {
+            self.session.finish(&recording, FILMED_WITHIN_S, |_| ())?;
+            return Ok(None);
+        }
         let stream = |session: &mut Session| execute(session, &self.arm, trajectory);
         let motion = if throw {
             self.session.committed(stream)?
@@ -80,12 +88,12 @@ impl Run<'_> {
                 "the camera dropped {dropped} frames: is the machine busy?"
             ));
         }
-        Ok(Film {
+        Ok(Some(Film {
             first_stamp_ns,
             frames,
             dropped,
             motion,
-        })
+        }))
     }
 
     /// Keeps the film whole, if films are kept. One that cannot be written undoes nothing.
@@ -110,9 +118,11 @@ impl Run<'_> {
     pub fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
         self.arm_for(OperatingMode::Wiggle)?;
         let stage = Stage::begin("wiggle");
-        let film = self.film(WIGGLE_FRAMES, wiggle, false, &stage)?;
+        let lasts = (f64::from(RATE_HZ) * wiggle.duration_s()) as u32;
+        let film = self.film(lasts.min(WIGGLE_FRAMES), wiggle, (false, None), &stage)?;
+        let film = film.context("a wiggle begins at once")?;
         self.record.set_wiggle(film);
-        self.record.stages.wiggle_s = stage.done(&summary::of_film(&film));
+        self.record.stages.wiggle_s = stage.done(&film.describe());
         self.keep_film(files::WIGGLE_FILM)?;
         Ok(film)
     }
@@ -160,7 +170,7 @@ impl Run<'_> {
 
     /// Puts what the throw is for in its place, where a rig can, or tells a person to. A lob's
     /// board or a drape's wall would be in the wiggle's way before.
-    fn place(&mut self, target_m: [f64; 3]) -> anyhow::Result<()> {
+    pub(super) fn place(&mut self, target_m: [f64; 3]) -> anyhow::Result<()> {
         let task = self.record.task;
         if let Some(rig) = &self.setup.rig {
             let place = RigRequest::PlaceTarget { task, target_m };
@@ -197,6 +207,17 @@ impl Run<'_> {
     pub fn throw(&mut self, plan: &Plan) -> anyhow::Result<Film> {
         self.place(plan.target_m)?;
         self.arm_for(OperatingMode::Throw)?;
+        let film = self.throw_armed(plan, None)?;
+        film.context("this throw begins at once")
+    }
+
+    /// Throws with an arm that is armed for it, at an instant if one is named; no film if that is
+    /// over or the operator's control is not held then: nothing moved.
+    pub(super) fn throw_armed(
+        &mut self,
+        plan: &Plan,
+        begin: Option<MonotonicNs>,
+    ) -> anyhow::Result<Option<Film>> {
         let stage = Stage::begin("throw");
         // Empties the histograms, so that they hold this throw alone.
         pipeline::latency(self.session, &self.arm)?;
@@ -207,11 +228,20 @@ impl Run<'_> {
                 (f64::from(RATE_HZ) * lasts_s).ceil() as u32
             }
         };
-        let film = self.film(frames, &plan.trajectory, true, &stage)?;
+        self.wait_for(begin.map_or(MonotonicNs(0), |begin| begin.plus_s(-BEFORE_THROW_S)))?;
+        let film = self.film(frames, &plan.trajectory, (true, begin), &stage)?;
+        let Some(film) = film else {
+            stage.failed("its instant is over, or the control was let go");
+            return Ok(None);
+        };
         self.record.set_throw(film);
+        let started = MonotonicNs(film.motion.start_ns);
+        self.record.throw_late_s = begin.map(|begin| started.since_s(begin));
+        let strikes = started.plus_s(plan.predicted_time_s);
+        self.record.enabled_to_strike_s = Some(strikes.since_s(self.enabled));
         self.record.latency = Some(pipeline::latency(self.session, &self.arm)?);
-        self.record.stages.throw_s = stage.done(&summary::of_film(&film));
-        Ok(film)
+        self.record.stages.throw_s = stage.done(&film.describe());
+        Ok(Some(film))
     }
 
     /// The task's values, where the target is known.

@@ -38,6 +38,7 @@ pub struct Inputs {
     pub accept_unconfirmed: bool,
     pub robust: usize,
     pub keeps_films: bool,
+    pub fast: bool,
 }
 
 /// A target that is named must lie where a rope can strike.
@@ -175,6 +176,7 @@ impl Inputs {
             robust: 0,
             resumed: None,
             keeps_films: args.keep_films,
+            fast: false,
         })
     }
 
@@ -207,6 +209,7 @@ impl Inputs {
             ],
             accept_unconfirmed: args.accept_unconfirmed,
             robust: args.robust,
+            fast: args.fast,
             resumed,
             ..found
         })

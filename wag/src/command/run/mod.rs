@@ -5,7 +5,7 @@ mod filmed;
 mod inputs;
 mod rope;
 mod stages;
-mod summary;
+mod swing;
 
 pub use inputs::check_target;
 pub use stages::{Entry, Run, Setup};
@@ -23,9 +23,10 @@ use arm_model::{JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage, is_interrupted, watch_interrupts};
 use inputs::{Inputs, entry};
 use planner::PlannerConfig;
-use planner::wiggle::wiggle;
+use planner::plan::start_pose_for;
+use planner::wiggle::{WiggleConfig, wiggle};
 use rig_sim::random_target;
-use run_log::{RunRecord, files};
+use run_log::{RunRecord, files, outcome};
 use serde_json::{Value, json};
 use session::Session;
 use shared_types::ipc::message::{RigRequest, RigRpc};
@@ -58,7 +59,7 @@ pub fn in_folder(
     let result = result.with_context(|| format!("run `{}`", folder.path.display()));
     result.or_failed()?;
     keypoints_kept.or_failed()?;
-    summary::show(&record);
+    println!("{}", outcome(&record).trim_end());
     keep_report(&folder.path);
     recorded.or_failed()?;
     summary_kept.or_failed()?;
@@ -81,7 +82,28 @@ fn settings(args: &RunArgs) -> Outcome<PlannerConfig> {
     let options = &mut settings.identify;
     options.lead_mass_kg = args.lead_mass.or(options.lead_mass_kg);
     options.length_m = args.length.or(options.length_m);
+    if args.fast {
+        let task = args.task.unwrap_or_default();
+        let drawn = || random_target(task, args.seed);
+        let target_m = args.target.map_or_else(drawn, |target| target.0);
+        settings.wiggle = short_wiggle(&settings, task, target_m)?;
+    }
     Ok(settings)
+}
+
+/// The wiggle before a throw out of the swing that it leaves: in the throw's own start pose.
+pub fn short_wiggle(
+    settings: &PlannerConfig,
+    task: Task,
+    target_m: [f64; 3],
+) -> Outcome<WiggleConfig> {
+    if task == Task::Strike {
+        return Ok(settings.wiggle.short(start_pose_for(target_m)));
+    }
+    Err(bad_input!(
+        "--fast is for strikes: what a {} takes to plan, no swing can be foretold for",
+        task.name()
+    ))
 }
 
 pub fn run(args: &RunArgs) -> Outcome<Option<Value>> {
@@ -261,6 +283,7 @@ fn on_camera(
             accept_unconfirmed: inputs.accept_unconfirmed,
             robust: inputs.robust,
             keeps_films: inputs.keeps_films,
+            fast: inputs.fast,
         };
         Run::start(&folder, session, record, setup, &stage)?.go(entry)
     };

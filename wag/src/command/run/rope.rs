@@ -8,6 +8,7 @@ use crate::pipeline::{arm_for, execute};
 use anyhow::{Context, bail, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use cli_output::Stage;
+use planner::history::ArmHistory;
 use planner::plan::{PlanOptions, PlanRequest, warnings};
 use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
 use planner::settle::SettleRequest;
@@ -32,7 +33,7 @@ const UNASKED_S: [f64; 2] = [2.0, 32.0];
 /// The same of a move that must begin soon after it was confirmed.
 const ASKED_S: [f64; 2] = [2.0, 8.0];
 /// Latest begin after it was confirmed (s), with half a second for the controller to hear of it.
-const CONFIRMED_S: f64 = THROW_WITHIN_NS as f64 * 1e-9 - 0.5;
+pub(super) const CONFIRMED_S: f64 = THROW_WITHIN_NS as f64 * 1e-9 - 0.5;
 /// How long the rope is watched for its stillness where somebody waits (s).
 const WATCHED_S: f64 = 15.0;
 /// What an operator confirms before it.
@@ -182,8 +183,9 @@ impl Run<'_> {
         rope.keep(&self.folder.file(files::ROPE))
     }
 
-    /// Plans the throw with what was identified.
-    pub fn plan(&mut self, rope: &KnownRope) -> anyhow::Result<Plan> {
+    /// Plans the throw with what was identified, of a rope that hangs still or, where what the
+    /// arm did `before` is told, swings.
+    pub fn plan(&mut self, rope: &KnownRope, before: Option<ArmHistory>) -> anyhow::Result<Plan> {
         let stage = Stage::begin("plan");
         let options = PlanOptions {
             seed: self.record.seed,
@@ -202,6 +204,7 @@ impl Run<'_> {
             cell: settings.cell,
             ensemble: rope.ensemble(*robust, options.seed)?,
             following: self.following.clone(),
+            before,
             ..PlanRequest::new(goal, &rope.params, options)
         }));
         let mut plan = match self.ask_planner(&request, PLANNING_S, &stage)? {
@@ -269,6 +272,41 @@ impl Run<'_> {
         Ok(())
     }
 
+    /// What the arm did since the wiggle's film began, where it stands in `start_q` until `start`.
+    pub(super) fn history(
+        &mut self,
+        film: &Film,
+        start_q: JointVector,
+        start: MonotonicNs,
+    ) -> anyhow::Result<ArmHistory> {
+        self.session.received.drain()?;
+        let cycles = &self.session.received.cycles;
+        let joints = cycles.joints_between(film.first_stamp_ns, u64::MAX);
+        // The rope hangs still at the first joint sample.
+        let epoch = joints.first().map_or(start, |(ns, _)| MonotonicNs(*ns));
+        let since_epoch = |(ns, q): &(u64, _)| (MonotonicNs(*ns).since_s(epoch), *q);
+        let (times_s, q) = joints.iter().map(since_epoch).unzip();
+        Ok(ArmHistory {
+            times_s,
+            q,
+            start_s: start.since_s(epoch),
+            start_q,
+        })
+    }
+
+    /// Waits, without a pause in what must be heard, until a motion is to be handed over that
+    /// begins at `begin`; false if that is over.
+    pub(super) fn wait_for(&mut self, begin: MonotonicNs) -> anyhow::Result<bool> {
+        let left_s = || begin.since_s(MonotonicNs(now_ns())) - HANDOVER_S;
+        if left_s() < 0.0 {
+            return Ok(false);
+        }
+        let idle_s = (left_s() - 0.03).max(0.0);
+        self.session.idle(Duration::from_secs_f64(idle_s))?;
+        std::thread::sleep(Duration::from_secs_f64(left_s().max(0.0)));
+        Ok(true)
+    }
+
     /// Plans a settling move for the instant `begin` and makes it, if it may begin then.
     fn settle_at(
         &mut self,
@@ -279,22 +317,11 @@ impl Run<'_> {
         if confirmed.is_some_and(|at| begin.since_s(at) > CONFIRMED_S) {
             return Ok(Attempt::Unheld);
         }
-        self.session.received.drain()?;
-        let cycles = &self.session.received.cycles;
-        let joints = cycles.joints_between(film.first_stamp_ns, u64::MAX);
         let start = begin.plus_s(self.record.arm_lag_s.unwrap_or_default());
-        // The rope hangs still at the first joint sample.
-        let epoch = joints.first().map_or(start, |(ns, _)| MonotonicNs(*ns));
-        let (times_s, q) = joints
-            .iter()
-            .map(|(stamp_ns, q)| (MonotonicNs(*stamp_ns).since_s(epoch), *q))
-            .unzip();
+        let before = self.history(film, wiggle.end(), start)?;
         let request = PlannerRequest::Settle(Box::new(SettleRequest {
             rope: *rope,
-            times_s,
-            q,
-            start_s: start.since_s(epoch),
-            start_q: wiggle.end(),
+            before,
             end_q: plan.trajectory.start(),
             limits: self.setup.limits.clone(),
             cell: self.setup.settings.cell,
@@ -309,19 +336,15 @@ impl Run<'_> {
         stage.say(format!("damping {swing_cm:.1} cm of swing"));
         let mode = OperatingMode::Wiggle;
         self.check_motion(&found.trajectory, mode)?;
-        let left_s = || begin.since_s(MonotonicNs(now_ns())) - HANDOVER_S;
-        let until = |before_s: f64| Duration::from_secs_f64((left_s() - before_s).max(0.0));
         // An arming lasts some seconds only, and where planning was quick there are many left.
-        self.session.idle(until(1.0))?;
-        if left_s() > 0.0 {
+        self.wait_for(begin.plus_s(-1.0))?;
+        if begin.0 > now_ns() {
             let confirmed_ns = confirmed.map_or_else(now_ns, |at| at.0);
             arm_for(self.session, &self.arm, mode, Some(confirmed_ns))?;
         }
-        if left_s() < 0.0 {
+        if !self.wait_for(begin)? {
             return Ok(Attempt::Late);
         }
-        self.session.idle(until(0.03))?;
-        std::thread::sleep(until(0.0));
         if !self.session.is_held() {
             return Ok(Attempt::Unheld);
         }

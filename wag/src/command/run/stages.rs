@@ -5,7 +5,7 @@ use crate::command::known_rope::KnownRope;
 use crate::command::motion;
 use crate::command::on_arm::{AT_START, enable, set_up_move};
 use crate::pipeline::{self, ArmAddress, ArmLink, BringUp, FramesFrom, RunFolder};
-use anyhow::{anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use arm_model::{JointTrajectory, Limits};
 use camera_ingest::calib::keep_calibration;
 use cli_output::{Stage, output};
@@ -13,17 +13,22 @@ use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::service::{PlannerRequest, PlannerRpc};
 use planner::wiggle::wiggle;
+use rt_controller::os::now_ns;
+use rt_controller::point_to_point::fraction_that_lasts;
 use run_log::{Film, RunRecord, files};
 use session::Session;
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRpc, RopeAppearance};
 use shared_types::ipc::rpc::RpcClient;
-use shared_types::{OperatingMode, Plan, StereoCamera, Task};
+use shared_types::{MonotonicNs, OperatingMode, Plan, StereoCamera, Task};
 
 /// Speed of moves between poses, as a part of the fastest move.
 ///
 /// Slow enough that the move lasts several periods of the rope's pendulum and
 /// leaves it with millimetres of swing.
 const MOVE_SPEED: f64 = 0.04;
+/// How long it lasts instead where a run is to be fast (s): two periods of the slowest pendulum of
+/// the ranges, 0.6 Hz, which a jerk-limited move leaves with a fiftieth of its way.
+const FAST_MOVE_S: f64 = 3.5;
 /// Longest wait for the rope to hang still after a move that was planned to bring it to rest (s).
 pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 /// The same after any other move, where the swing of whatever was before decays by itself (s).
@@ -63,6 +68,8 @@ pub struct Setup {
     pub robust: usize,
     /// Whether the films are kept whole, both images.
     pub keeps_films: bool,
+    /// Whether to throw out of the swing that the wiggle leaves.
+    pub fast: bool,
 }
 
 /// The running processes and what all stages need.
@@ -75,6 +82,8 @@ pub struct Run<'a> {
     pub(super) camera: RpcClient<CameraRpc>,
     pub(super) planner: RpcClient<PlannerRpc>,
     pub(super) arm: ArmLink,
+    /// When the arm was enabled.
+    pub(super) enabled: MonotonicNs,
 }
 
 impl<'a> Run<'a> {
@@ -114,6 +123,7 @@ impl<'a> Run<'a> {
             camera,
             planner,
             arm,
+            enabled: MonotonicNs(0),
         };
         run.look(stage)?;
         let unseen = match run.record.task {
@@ -152,7 +162,7 @@ impl<'a> Run<'a> {
 
     /// From the entry to its end: that of the throw, but for a wiggle alone.
     pub fn go(&mut self, from: Entry) -> anyhow::Result<()> {
-        let plan = match from {
+        let (plan, thrown) = match from {
             Entry::WiggleAlone => {
                 self.tracked()?;
                 self.record.ok = true;
@@ -162,24 +172,31 @@ impl<'a> Run<'a> {
                 self.keep_plan(&plan)?;
                 self.check_throw(&plan)?;
                 self.bring_up(&plan.trajectory)?;
-                *plan
+                (*plan, None)
             }
             Entry::Rope(rope) => {
                 self.keep_rope(&rope)?;
-                let plan = self.plan(&rope)?;
+                let plan = self.plan(&rope, None)?;
                 self.confirm_move("The arm will be enabled and move to the throw's start.")?;
                 self.bring_up(&plan.trajectory)?;
-                plan
+                (plan, None)
             }
             Entry::Wiggle => {
                 let (motion, film, appearance) = self.tracked()?;
                 let rope = self.identify(&film, appearance)?;
-                let plan = self.plan(&rope)?;
-                self.settle((&rope.params, &film, &motion, &plan))?;
-                plan
+                if let Some((plan, throw)) = self.throw_out_of_swing(&rope, &film, &motion)? {
+                    (plan, Some(throw))
+                } else {
+                    let plan = self.plan(&rope, None)?;
+                    self.settle((&rope.params, &film, &motion, &plan))?;
+                    (plan, None)
+                }
             }
         };
-        let throw = self.throw(&plan)?;
+        let throw = match thrown {
+            Some(throw) => throw,
+            None => self.throw(&plan)?,
+        };
         if throw.frames > 0 {
             self.score(&throw, &plan);
         }
@@ -250,12 +267,16 @@ impl<'a> Run<'a> {
     /// Enables the arm, moves to the start pose, waits for the rope.
     fn bring_up(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
         let stage = Stage::begin("bring-up");
+        if self.setup.fast {
+            self.wait_or_warn(&stage)?;
+        }
         let mut found = BringUp::default();
         let of = (&self.setup.address, self.setup.acknowledges);
         let enabled = enable(self.session, &self.arm, of, &mut found);
         self.record.bring_up = found.steps_json();
         self.record.warnings.extend(found.warnings);
         enabled?;
+        self.enabled = MonotonicNs(now_ns());
         self.move_to_start(motion, &stage)?;
         let confirmation = if self.setup.address.simulated && !self.setup.asks {
             " (simulated: no confirmation needed)"
@@ -267,9 +288,22 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Moves to the start of `motion` at set-up speed, and waits for the rope.
+    /// Moves to the start of `motion` at set-up speed, and waits for the rope; where the run is to
+    /// be fast, it hung still before, and the move leaves it so.
     fn move_to_start(&mut self, motion: &JointTrajectory, stage: &Stage) -> anyhow::Result<()> {
-        set_up_move(self.session, &self.arm, motion.start(), MOVE_SPEED)?;
+        let speed = if self.setup.fast {
+            self.session.received.drain()?;
+            let now = self.session.received.cycles.joints_between(0, u64::MAX);
+            let (_, from) = now.last().context("the arm does not report its joints")?;
+            let limits = &self.setup.limits;
+            fraction_that_lasts(from, &motion.start(), FAST_MOVE_S, limits)?
+        } else {
+            MOVE_SPEED
+        };
+        set_up_move(self.session, &self.arm, motion.start(), speed)?;
+        if self.setup.fast {
+            return Ok(());
+        }
         self.wait_or_warn(stage)
     }
 
