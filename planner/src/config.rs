@@ -2,7 +2,7 @@
 
 use crate::identify::IdentifyOptions;
 use crate::plan::{
-    Drape, DrapeConfig, Lob, LobConfig, PlanOptions, Strike, ThrowConfig, ThrowGoal,
+    Drape, DrapeConfig, Lob, LobConfig, PlanOptions, Strike, ThrowConfig, ThrowGoal, start_pose_for,
 };
 use crate::settle::SettleConfig;
 use crate::wiggle::WiggleConfig;
@@ -65,7 +65,31 @@ impl PlannerConfig {
         self.identify.seed = seed;
         self
     }
+
+    /// The same with a short wiggle in the start pose of a strike, which can begin out of the
+    /// swing that is left.
+    ///
+    /// # Errors
+    /// Another task: its search takes longer than a swing can be predicted for.
+    pub fn with_short_wiggle(
+        mut self,
+        task: Task,
+        target_m: [f64; 3],
+    ) -> Result<Self, NotOutOfSwing> {
+        if task != Task::Strike {
+            return Err(NotOutOfSwing(task.name()));
+        }
+        self.wiggle = self.wiggle.short(start_pose_for(target_m));
+        Ok(self)
+    }
 }
+
+/// A task whose throw cannot begin out of a swing.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "only a strike is thrown out of a swing: a {0} is searched for longer than the swing can be predicted; leave --fast out"
+)]
+pub struct NotOutOfSwing(&'static str);
 
 impl Default for PlannerConfig {
     fn default() -> Self {

@@ -233,6 +233,8 @@ mod tests {
             assert!(moving.simulations < 250, "{}", moving.simulations);
             let true_m = error_m(&request, &motion, &moving.trajectory);
             assert!(true_m < 4e-3, "{index}: {true_m}");
+            // The arm stands where the throw begins.
+            assert_eq!(moving.trajectory.start(), motion.end());
             // The same throw for a rope at rest would miss.
             let resting = PlanRequest {
                 before: None,

@@ -60,21 +60,20 @@ pub(crate) fn plan(
         |posterior| ensemble(&rope, &posterior, &given),
     );
     let ensemble = ensemble.or_input()?;
+    let options = PlanOptions {
+        seed: given.seed,
+        threads: given.threads.clamp(1, THREADS_MAX),
+        ..config.search
+    };
     let request = PlanRequest {
-        goal: config.goal(kind, target_m),
-        rope,
         cell: match &given.cell {
             Some(path) => cell_of(Some(path))?,
             None => config.cell,
         },
-        options: PlanOptions {
-            seed: given.seed,
-            threads: given.threads.clamp(1, THREADS_MAX),
-            ..config.search
-        },
         ensemble,
         following: response.map(|response| Following::new(&response, &limits)),
         limits,
+        ..PlanRequest::new(config.goal(kind, target_m), &rope, options)
     };
     interruptible(py, |progress| {
         let plan = planner::plan(&request, progress).map_err(of_plan)?;

@@ -5,7 +5,7 @@ use anyhow::bail;
 use serde::Serialize;
 use serde_json::{Value, json};
 use shared_types::ipc::message::{LatencyReport, RigEvent, RopeAppearance, ScoreResult};
-use shared_types::{Plan, RopeEstimate, RopeParams, Task, Verdict};
+use shared_types::{MonotonicNs, Plan, RopeEstimate, RopeParams, Task, Verdict};
 use std::path::Path;
 
 /// When a motion ran (CLOCK_MONOTONIC, ns).
@@ -16,6 +16,9 @@ pub struct MotionSpan {
     /// Deadline of the last setpoint.
     pub end_ns: u64,
 }
+
+/// Latest begin of a throw out of a swing that is as good as planned (s).
+const LATE_MAX_S: f64 = 0.02;
 
 /// Wall time of each stage (s).
 #[derive(Debug, Clone, Default, Serialize)]
@@ -211,9 +214,18 @@ impl RunRecord {
         self.wiggle = Some(film);
     }
 
-    /// Keeps when the throw ran; times count from its film where there was no wiggle.
-    pub fn set_throw(&mut self, film: Film) {
+    /// Keeps when the throw ran, and how much later than it was planned to `begin`; times count
+    /// from its film where there was no wiggle.
+    pub fn set_throw(&mut self, film: Film, begin: Option<MonotonicNs>) {
         self.throw = Some(film.motion);
+        let late_s = begin.map(|begin| MonotonicNs(film.motion.start_ns).since_s(begin));
+        self.throw_late_s = late_s;
+        if let Some(late_s) = late_s.filter(|s| s.abs() > LATE_MAX_S) {
+            self.warnings.push(format!(
+                "the throw began {:.0} ms later than planned, when the rope had swung on",
+                1e3 * late_s
+            ));
+        }
         if self.wiggle.is_none() {
             self.epoch_ns = film.first_stamp_ns;
         }

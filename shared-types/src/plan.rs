@@ -186,6 +186,14 @@ pub struct Plan {
     pub trajectory_sha256: String,
 }
 
+impl Plan {
+    /// Upper end of the forecast of the error (m); infinite without one.
+    #[must_use]
+    pub fn reaches_m(&self) -> f64 {
+        self.forecast.map_or(f64::INFINITY, |f| f.interval_90_m[1])
+    }
+}
+
 /// SHA-256 of a trajectory's waypoints and times, little-endian, in order. The
 /// controller recomputes it before it accepts a plan.
 #[must_use]

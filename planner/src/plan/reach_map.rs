@@ -67,6 +67,7 @@ impl ReachMap {
             start: start_pose_for([1.0, 0.0, 0.0]),
             dimensions: Dimensions::Planar,
             turn_max_rad: 0.0,
+            stands: false,
             times_s: config.waypoint_times_s,
             stretch_max: 1.0,
         };

@@ -213,6 +213,7 @@ mod tests {
             start: START_POSE,
             dimensions: Dimensions::Full,
             turn_max_rad: 0.0,
+            stands: false,
             times_s: [0.45, 0.80, 1.15],
             stretch_max,
         };

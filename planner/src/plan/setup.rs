@@ -37,7 +37,7 @@ pub(super) struct Setup<'a> {
     prelude: Option<Prelude>,
 }
 
-/// Most by which a throw of a rope that curls is turned away from the target's bearing
+/// Most by which a throw of a rope that curls or swings is turned away from the target's bearing
 /// (rad): what the tip of such a rope hangs aside, as seen from the base axis.
 const TURN_MAX_RAD: f64 = 0.3;
 
@@ -77,15 +77,25 @@ impl<'a> Setup<'a> {
         task: &'a dyn ThrowTask,
         request: &'a PlanRequest,
     ) -> Result<Self, PlanError> {
+        Self::from_states(task, request, None)
+    }
+
+    /// The same where the states of the ropes when the throw begins are known.
+    pub(super) fn from_states(
+        task: &'a dyn ThrowTask,
+        request: &'a PlanRequest,
+        states: Option<Vec<RopeState>>,
+    ) -> Result<Self, PlanError> {
         let config = task.config();
         let space = WaypointSpace {
             start: start_pose_for(task.target_m()),
             dimensions: request.options.dimensions,
-            turn_max_rad: if curls(&request.rope) {
+            turn_max_rad: if curls(&request.rope) || request.before.is_some() {
                 TURN_MAX_RAD
             } else {
                 0.0
             },
+            stands: request.before.is_some(),
             times_s: config.waypoint_times_s,
             stretch_max: request.options.segment_stretch_max,
         };
@@ -141,7 +151,10 @@ impl<'a> Setup<'a> {
             task,
             request,
         };
-        setup.states = setup.led_to(&setup.ropes)?;
+        setup.states = match states {
+            Some(states) => states,
+            None => setup.led_to(&setup.ropes)?,
+        };
         Ok(setup)
     }
 

@@ -54,6 +54,8 @@ pub(super) struct WaypointSpace {
     /// Most by which joint 1 is turned all along, start included (rad); 0 where it keeps
     /// the target's bearing. A rope that curls leaves the plane of the throw.
     pub turn_max_rad: f64,
+    /// Whether the arm stands at the start already: joint 1 turns on the way then.
+    pub stands: bool,
     /// Most by which a segment between these times is stretched or shrunk (1); 1
     /// where they are fixed, as in the paper.
     pub stretch_max: f64,
@@ -143,7 +145,7 @@ impl WaypointSpace {
             }
         }
         if let Some(turn) = x.get(poses).filter(|_| self.turn_max_rad > 0.0) {
-            for knot in &mut out {
+            for knot in &mut out[usize::from(self.stands)..] {
                 knot[0] += turn;
             }
         }
@@ -161,7 +163,8 @@ impl WaypointSpace {
         let joints = self.dimensions.joints();
         let moved = knots[1..].iter().flat_map(|q| joints.iter().map(|&j| q[j]));
         let mut x: Vec<f64> = moved.collect();
-        x.resize(self.pose_count(), knots[0][0] - self.start[0]);
+        let turned = knots[usize::from(self.stands)][0];
+        x.resize(self.pose_count(), turned - self.start[0]);
         if self.is_timed() {
             let spans = times_s.windows(2).zip(fixed_s.windows(2));
             x.extend(spans.map(|(is, fixed)| libm::log((is[1] - is[0]) / (fixed[1] - fixed[0]))));
@@ -196,6 +199,7 @@ mod tests {
             start: START_POSE,
             dimensions,
             turn_max_rad: 0.0,
+            stands: false,
             times_s: [0.4, 0.8, 1.1],
             stretch_max,
         })
@@ -215,6 +219,21 @@ mod tests {
             assert!((moved.waypoints()[2][joint] - START_POSE[joint] - 0.25).abs() < 1e-12);
             assert_eq!(moved.waypoints()[1], START_POSE);
             assert_eq!(moved.times_s(), &[0.0, 0.4, 0.8, 1.1]);
+        }
+    }
+
+    #[test]
+    fn an_arm_that_stands_is_turned_on_the_way() {
+        for stands in [false, true] {
+            let mut space = spaces(1.0)[0].clone();
+            (space.turn_max_rad, space.stands) = (0.3, stands);
+            let mut x = space.resting();
+            *x.last_mut().unwrap() = 0.1;
+            let turned = space.decode(&x).unwrap();
+            let moved = |q: &JointVector| (q[0] - START_POSE[0] - 0.1).abs() < 1e-12;
+            let moved: Vec<bool> = turned.waypoints().iter().map(moved).collect();
+            assert_eq!(moved, [!stands, true, true, true]);
+            assert_eq!(space.encode(&turned), Some(x));
         }
     }
 

@@ -1,7 +1,7 @@
 //! `wag demo`: one throw from start to end on a simulated rig that is started for it.
 
 use super::plan_again::{LastThrow, check_thrown};
-use super::run::{Entry, Run, Setup, check_target, in_folder, short_wiggle};
+use super::run::{Entry, Run, Setup, check_target, in_folder};
 use crate::cli::DemoArgs;
 use crate::config;
 use crate::pipeline::{self, FramesFrom, RunFolder};
@@ -30,7 +30,7 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
         (None, None) => random_target(args.task, seed),
     };
     if args.fast {
-        settings.wiggle = short_wiggle(&settings, args.task, target_m)?;
+        settings = settings.with_short_wiggle(args.task, target_m).or_input()?;
     }
     // Refused before anything starts, whatever rope turns out to be there.
     check_target(target_m, &settings)?;

@@ -38,11 +38,9 @@ impl Setup<'_> {
         };
         let request = PlanRequest {
             options,
-            before: None,
             ..self.request.clone()
         };
-        let mut quick = Setup::new(self.task, &request)?;
-        quick.states.clone_from(&self.states);
+        let quick = Setup::from_states(self.task, &request, Some(self.states.clone()))?;
         let found = quick.recall(library, count)?;
         let Some((nearest, _)) = found.first() else {
             return Ok(None);

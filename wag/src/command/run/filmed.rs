@@ -234,9 +234,8 @@ impl Run<'_> {
             stage.failed("its instant is over, or the control was let go");
             return Ok(None);
         };
-        self.record.set_throw(film);
+        self.record.set_throw(film, begin);
         let started = MonotonicNs(film.motion.start_ns);
-        self.record.throw_late_s = begin.map(|begin| started.since_s(begin));
         let strikes = started.plus_s(plan.predicted_time_s);
         self.record.enabled_to_strike_s = Some(strikes.since_s(self.enabled));
         self.record.latency = Some(pipeline::latency(self.session, &self.arm)?);

@@ -23,8 +23,7 @@ use arm_model::{JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage, is_interrupted, watch_interrupts};
 use inputs::{Inputs, entry};
 use planner::PlannerConfig;
-use planner::plan::start_pose_for;
-use planner::wiggle::{WiggleConfig, wiggle};
+use planner::wiggle::wiggle;
 use rig_sim::random_target;
 use run_log::{RunRecord, files, outcome};
 use serde_json::{Value, json};
@@ -86,24 +85,9 @@ fn settings(args: &RunArgs) -> Outcome<PlannerConfig> {
         let task = args.task.unwrap_or_default();
         let drawn = || random_target(task, args.seed);
         let target_m = args.target.map_or_else(drawn, |target| target.0);
-        settings.wiggle = short_wiggle(&settings, task, target_m)?;
+        settings = settings.with_short_wiggle(task, target_m).or_input()?;
     }
     Ok(settings)
-}
-
-/// The wiggle before a throw out of the swing that it leaves: in the throw's own start pose.
-pub fn short_wiggle(
-    settings: &PlannerConfig,
-    task: Task,
-    target_m: [f64; 3],
-) -> Outcome<WiggleConfig> {
-    if task == Task::Strike {
-        return Ok(settings.wiggle.short(start_pose_for(target_m)));
-    }
-    Err(bad_input!(
-        "--fast is for strikes: what a {} takes to plan, no swing can be foretold for",
-        task.name()
-    ))
 }
 
 pub fn run(args: &RunArgs) -> Outcome<Option<Value>> {

@@ -177,7 +177,10 @@ impl<'a> Run<'a> {
             Entry::Rope(rope) => {
                 self.keep_rope(&rope)?;
                 let plan = self.plan(&rope, None)?;
-                self.confirm_move("The arm will be enabled and move to the throw's start.")?;
+                // What was confirmed before may be minutes old.
+                let what = "The arm will be enabled and move to the throw's start.";
+                let asked = self.setup.asks.then(|| self.session.confirm(what, "MOVE"));
+                asked.transpose()?;
                 self.bring_up(&plan.trajectory)?;
                 (plan, None)
             }
@@ -217,10 +220,12 @@ impl<'a> Run<'a> {
         Ok((motion, film, appearance))
     }
 
-    /// Tells a person, and keeps it in the summary.
+    /// Tells a person once, and keeps it in the summary.
     pub(super) fn warn(&mut self, warning: &str) {
-        output::remark(format_args!("warning: {warning}"));
-        self.record.warnings.push(warning.to_owned());
+        if self.record.warnings.iter().all(|told| told != warning) {
+            output::remark(format_args!("warning: {warning}"));
+            self.record.warnings.push(warning.to_owned());
+        }
     }
 
     /// Asks the camera; its last event, unless that is a failure.
@@ -256,14 +261,6 @@ impl<'a> Run<'a> {
         pipeline::arm_for(self.session, &self.arm, operating_mode, Some(confirmed_ns))
     }
 
-    /// Lets the operator confirm a move that begins minutes after what was confirmed before.
-    fn confirm_move(&mut self, what: &str) -> anyhow::Result<()> {
-        if self.setup.asks {
-            self.session.confirm(what, "MOVE")?;
-        }
-        Ok(())
-    }
-
     /// Enables the arm, moves to the start pose, waits for the rope.
     fn bring_up(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
         let stage = Stage::begin("bring-up");
@@ -277,7 +274,10 @@ impl<'a> Run<'a> {
         self.record.warnings.extend(found.warnings);
         enabled?;
         self.enabled = MonotonicNs(now_ns());
-        self.move_to_start(motion, &stage)?;
+        self.move_to_start(motion)?;
+        if !self.setup.fast {
+            self.wait_or_warn(&stage)?;
+        }
         let confirmation = if self.setup.address.simulated && !self.setup.asks {
             " (simulated: no confirmation needed)"
         } else {
@@ -288,23 +288,17 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Moves to the start of `motion` at set-up speed, and waits for the rope; where the run is to
-    /// be fast, it hung still before, and the move leaves it so.
-    fn move_to_start(&mut self, motion: &JointTrajectory, stage: &Stage) -> anyhow::Result<()> {
-        let speed = if self.setup.fast {
+    /// Moves to the start of `motion` at set-up speed. Where the run is to be fast the rope hung
+    /// still before, and the move leaves it so.
+    fn move_to_start(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
+        let mut speed = MOVE_SPEED;
+        if self.setup.fast {
             self.session.received.drain()?;
             let now = self.session.received.cycles.joints_between(0, u64::MAX);
             let (_, from) = now.last().context("the arm does not report its joints")?;
-            let limits = &self.setup.limits;
-            fraction_that_lasts(from, &motion.start(), FAST_MOVE_S, limits)?
-        } else {
-            MOVE_SPEED
-        };
-        set_up_move(self.session, &self.arm, motion.start(), speed)?;
-        if self.setup.fast {
-            return Ok(());
+            speed = fraction_that_lasts(from, &motion.start(), FAST_MOVE_S, &self.setup.limits)?;
         }
-        self.wait_or_warn(stage)
+        set_up_move(self.session, &self.arm, motion.start(), speed)
     }
 
     /// Waits until the rope hangs still, or its swing has had time to decay.

@@ -19,6 +19,10 @@ const QUESTION: (&str, &str) = (
 /// Time allowed for planning before the throw begins, and the longest after plans that came too
 /// late, each twice as long (s).
 const PLANNING_S: [f64; 2] = [0.45, 1.8];
+/// Least of it that must be left to arm and to begin the film (s).
+const LEFT_MIN_S: f64 = 0.1;
+/// Most by which the swing may widen a forecast (1).
+const WORSE_MAX: f64 = 1.3;
 
 impl Run<'_> {
     /// Throws out of the swing, if the run is to be fast: plan and film. Where that promises too
@@ -38,6 +42,7 @@ impl Run<'_> {
         let asked = self.setup.asks.then_some(QUESTION);
         let confirmed_ns = self.session.confirm_and_hold(asked)?;
         let [mut planning_s, longest_s] = PLANNING_S;
+        let mut most_m = FORECAST_WARN_M;
         let why = loop {
             let begin = MonotonicNs(now_ns()).plus_s(planning_s);
             if begin.since_s(MonotonicNs(confirmed_ns)) > CONFIRMED_S {
@@ -48,14 +53,22 @@ impl Run<'_> {
             let start = begin.plus_s(lag_s.unwrap_or_default());
             let before = self.history(film, wiggle.end(), start)?;
             let plan = self.plan(rope, Some(before))?;
-            let upper_m = plan.forecast.map_or(f64::INFINITY, |f| f.interval_90_m[1]);
-            if upper_m > FORECAST_WARN_M {
-                break format!("the forecast reaches up to {:.1} cm", 100.0 * upper_m);
+            let reaches_m = plan.reaches_m();
+            if reaches_m > most_m {
+                // What is as uncertain of a rope at rest, calming does not mend.
+                let calm_m = most_m.max(WORSE_MAX * self.plan(rope, None)?.reaches_m());
+                if reaches_m <= calm_m {
+                    most_m = calm_m;
+                    continue;
+                }
+                break format!("the forecast reaches up to {:.1} cm", 100.0 * reaches_m);
             }
-            let (session, mode) = (&mut *self.session, OperatingMode::Throw);
-            arm_for(session, &self.arm, mode, Some(confirmed_ns))?;
-            if let Some(throw) = self.throw_armed(&plan, Some(begin))? {
-                return Ok(Some((plan, throw)));
+            if begin.since_s(MonotonicNs(now_ns())) > LEFT_MIN_S {
+                let (session, mode) = (&mut *self.session, OperatingMode::Throw);
+                arm_for(session, &self.arm, mode, Some(confirmed_ns))?;
+                if let Some(throw) = self.throw_armed(&plan, Some(begin))? {
+                    return Ok(Some((plan, throw)));
+                }
             }
             if planning_s >= longest_s {
                 break "planning takes too long here".to_owned();
