@@ -186,7 +186,22 @@ pub struct Plan {
     pub trajectory_sha256: String,
 }
 
+/// A plan that is good for one instant only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the plan is for a rope that still swung when its throw began, as no other throw will: plan it anew for this rope at rest (`wag run --from plan RUN`, or `wag plan strike --rope`)"
+)]
+pub struct NotAtRest;
+
 impl Plan {
+    /// Refuses a plan that cannot be thrown later.
+    ///
+    /// # Errors
+    /// The rope did not hang still when its throw began.
+    pub fn require_at_rest(&self) -> Result<(), NotAtRest> {
+        self.start.as_ref().map_or(Ok(()), |_| Err(NotAtRest))
+    }
+
     /// Upper end of the forecast of the error (m); infinite without one.
     #[must_use]
     pub fn reaches_m(&self) -> f64 {

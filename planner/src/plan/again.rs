@@ -42,10 +42,8 @@ pub fn plan_again(request: &PlanRequest, last: &Plan, miss_m: [f64; 3]) -> Resul
     let (ThrowGoal::Strike(strike), Task::Strike) = (&request.goal, last.task) else {
         return refused("only strikes are corrected by their miss: plan a lob or a drape anew");
     };
-    if last.start.is_some() || request.before.is_some() {
-        return refused(
-            "the last throw began with a rope that still swung, and another would not begin so: identify and throw anew, without --fast",
-        );
+    if let Err(swung) = last.require_at_rest() {
+        return refused(swung.to_string());
     }
     if last.cell.is_some_and(|cell| cell != request.cell) {
         return refused("the last throw was planned for another cell: plan anew");

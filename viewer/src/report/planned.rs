@@ -43,7 +43,13 @@ impl PlannedMotion {
         let arm = PlannedArm::new(plan.trajectory, cell.pole);
         let frames = frames(plan.trajectory.duration_s() + AFTER_S);
         let around = rope_sim::Scene::of_task(plan.task, plan.target_m, cell);
-        let rope = simulate(&around, &plan.rope, &arm, frames, STEP_S)?;
+        let rope = simulate(
+            &around,
+            (&plan.rope, plan.start.as_ref()),
+            &arm,
+            frames,
+            STEP_S,
+        )?;
         Ok(Self {
             rope: rope.map_or_else(Vec::new, |rope| rows(&rope, 1)),
             radii_m: [plan.rope.radius_m, plan.rope.lead_radius_m],

@@ -11,7 +11,7 @@ use rope_sim::{
 };
 use run_log::Cycles;
 use shared_types::ipc::{ControllerMode, CycleRecord};
-use shared_types::{MonotonicNs, Plan, RopeParams};
+use shared_types::{MonotonicNs, Plan, RopeParams, RopeState};
 
 const RATE_HZ: f64 = 60.0;
 /// Samples of a throw's tip for each frame: at 10 m/s it moves by 2 cm from one to the next.
@@ -73,9 +73,12 @@ pub(crate) fn scene(
     let until_s = MonotonicNs(last.deadline_ns).since_s(begin).min(LONGEST_S) + AFTER_S;
     let (times_s, q, is_measured) = moved(motion, begin, until_s, known.cycles);
     let arm = MeasuredArm::new(&times_s, &q, known.cell.pole).context("the joints of a motion")?;
-    let frames = frames(BEFORE_S + until_s);
+    let start = plan.and_then(|plan| plan.start.as_ref());
+    // Where a rope that swings was is known when its throw begins, not before.
+    let before_s = start.map_or(BEFORE_S, |_| 0.0);
+    let frames = frames(before_s + until_s);
     // The simulator's clock begins with the first frame.
-    let shifted: Vec<f64> = times_s.iter().map(|t| t + BEFORE_S).collect();
+    let shifted: Vec<f64> = times_s.iter().map(|t| t + before_s).collect();
     let on_film =
         MeasuredArm::new(&shifted, &q, known.cell.pole).context("the joints of a motion")?;
     let step_s = if is_throw { STEP_S.0 } else { STEP_S.1 };
@@ -83,7 +86,10 @@ pub(crate) fn scene(
         rope_sim::Scene::of_task(plan.task, plan.target_m, &known.cell)
     });
     let rope = match known.rope {
-        Some(rope) => simulate(&around, rope, &on_film, finer(frames, rate), step_s)?,
+        Some(rope) => {
+            let finer = finer(frames, rate);
+            simulate(&around, (rope, start), &on_film, finer, step_s)?
+        }
         None => None,
     };
     let planned = match plan {
@@ -91,7 +97,7 @@ pub(crate) fn scene(
             let arm = PlannedArm::new(plan.trajectory, known.cell.pole);
             simulate(
                 &around,
-                &plan.rope,
+                (&plan.rope, start),
                 &arm,
                 finer(self::frames(until_s), rate),
                 STEP_S.0,
@@ -105,13 +111,13 @@ pub(crate) fn scene(
     };
     Ok(Scene {
         begin,
-        from_s: -BEFORE_S,
+        from_s: -before_s,
         period_s: frames.period_s,
         cell: known.cell,
         arm: (0..frames.count)
             .map(|i| arm_points(&on_film.joints_at(frames.time_s(i)).q, &known.cell.pole))
             .collect(),
-        tip: curve(&rope, -BEFORE_S),
+        tip: curve(&rope, -before_s),
         planned: curve(&planned, 0.0),
         planned_tip: planned
             .iter()
@@ -182,10 +188,11 @@ fn finer(frames: FrameTimes, rate: usize) -> FrameTimes {
     }
 }
 
-/// The rope in every frame, from hanging still in the first; none when it cannot be simulated.
+/// The rope in every frame, from its state in the first, or hanging still there; none when it
+/// cannot be simulated.
 pub(super) fn simulate(
     around: &rope_sim::Scene,
-    rope: &RopeParams,
+    (rope, start): (&RopeParams, Option<&RopeState>),
     motion: &dyn AttachMotion,
     frames: FrameTimes,
     step_s: f64,
@@ -195,7 +202,8 @@ pub(super) fn simulate(
         frames,
         ..SimOptions::new(step_s, Precision::F64, end_s)
     };
-    let rollouts = roll_out_in(around, &[Candidate::new(rope, motion)], &options)?;
+    let thrown = Candidate::new(rope, motion).from_state(start);
+    let rollouts = roll_out_in(around, &[thrown], &options)?;
     let whole = rollouts
         .into_iter()
         .find(|r| r.outcome != Outcome::Diverged);

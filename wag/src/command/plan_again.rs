@@ -14,11 +14,12 @@ use serde_json::{Value, json};
 use shared_types::{Plan, Task};
 use std::path::Path;
 
-/// Refuses to throw a plan whose track is unconfirmed, or that was made for another cell.
+/// Refuses to throw a plan whose track is unconfirmed, that was made for another cell, or for a
+/// rope that swung.
 pub fn check_thrown(plan: &Plan, accept_unconfirmed: bool) -> Outcome {
     confirm(&plan.unconfirmed, accept_unconfirmed, LOOK).or_failed()?;
     config::cell_for(plan).or_input()?;
-    Ok(())
+    plan.require_at_rest().or_input()
 }
 
 /// A throw that was made, and where its tip passed.
