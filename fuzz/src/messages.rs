@@ -71,6 +71,7 @@ fn planner_requests() -> [PlannerRequest; 4] {
         PlannerRequest::Settle(Box::new(SettleRequest {
             rope,
             before: ArmHistory {
+                sway: Default::default(),
                 times_s: vec![0.0],
                 q: vec![START_POSE],
                 start_s: 1.0,

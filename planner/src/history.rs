@@ -9,6 +9,7 @@ use rope_sim::{
     roll_out,
 };
 use serde::{Deserialize, Serialize};
+use shared_types::rope_state::Sway;
 use shared_types::{RopeParams, RopeState};
 
 /// Largest distance of a joint from the commanded start pose (rad): above what
@@ -21,10 +22,13 @@ const START_MAX_S: f64 = 1800.0;
 /// Longest step of the simulations that lead up to a motion (s).
 const STEP_S: f64 = 1e-3;
 
-/// What the arm did since the rope hung still, until it stands and a motion is to begin.
+/// What the arm did since the rope hung still, or all but still, until it stands and a motion is
+/// to begin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ArmHistory {
-    /// Times of the measured joints (s); the rope hangs still at time 0.
+    /// How the rope swings at time 0, as the film tells; none where it hangs still.
+    pub sway: Sway,
+    /// Times of the measured joints (s).
     pub times_s: Vec<f64>,
     /// Measured joints (rad). After the last one the arm holds.
     pub q: Vec<JointVector>,
@@ -58,6 +62,8 @@ pub enum HistoryError {
 #[derive(Debug)]
 pub(crate) struct Prelude {
     measured: MeasuredArm,
+    /// Swing of the rope at time 0.
+    pub(crate) sway: Sway,
     pub(crate) cell: Cell,
     /// When the motion begins (s).
     pub(crate) start_s: f64,
@@ -88,6 +94,7 @@ impl Prelude {
         }
         Ok(Self {
             measured,
+            sway: history.sway,
             cell: *cell,
             start_s,
             standing_error,
@@ -104,7 +111,8 @@ impl Prelude {
         threads: usize,
     ) -> Result<Vec<Option<RopeState>>, HistoryError> {
         let arm = &self.measured;
-        let candidates: Vec<_> = ropes.iter().map(|r| Candidate::new(r, arm)).collect();
+        let led = |rope| Candidate::new(rope, arm).with_sway(self.sway);
+        let candidates: Vec<_> = ropes.iter().map(led).collect();
         let options = SimOptions {
             keeps_end: true,
             threads,
@@ -186,6 +194,7 @@ mod tests {
         let (times_s, q) = samples(motion.duration_s(), |t| motion.state_at(t).q);
         let config = PlannerConfig::default();
         let before = ArmHistory {
+            sway: Sway::NONE,
             times_s,
             q,
             start_s: motion.duration_s() + WAITED_S,

@@ -56,8 +56,9 @@ pub use kernel::GRAVITY_M_S2;
 pub use lanes::{Kernel, Precision};
 pub use live::LiveRope;
 pub use motion::{AttachMotion, MeasuredArm, MotionError, PlannedArm, PoseRow, PoseTrack};
-pub use rollout::{Candidate, Outcome, Rollout, SimOptions, Start, Sway};
+pub use rollout::{Candidate, Outcome, Rollout, SimOptions, Start};
 pub use scene::{
     ContactSummary, Domino, DominoOutcome, Obstacle, RopePart, Scene, Shape, TaskFrame,
 };
+pub use shared_types::rope_state::Sway;
 pub use watch::{BoxRegion, ClosestApproach, Dwell, RestMeasures, Watch, Watched};

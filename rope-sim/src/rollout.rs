@@ -6,6 +6,7 @@ use crate::lanes::Precision;
 use crate::motion::AttachMotion;
 use crate::scene::{ContactSummary, DominoOutcome};
 use crate::watch::{Watch, Watched};
+use shared_types::rope_state::Sway;
 use shared_types::{RopeParams, RopeState};
 
 /// Most steps of one rollout, and most frames; more is a mistake in step or horizon.
@@ -76,24 +77,6 @@ pub struct Candidate<'a> {
     /// Point that its lead's closest approach to is measured (m, world); without one
     /// [`Watch::point_m`], which also says where positions are resolved best.
     pub point_m: Option<[f64; 3]>,
-}
-
-/// Swing left in a rope when a motion begins: its first mode in two planes, about. The rope
-/// hangs as it would if gravity were turned, and moves as if that turn were growing.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sway {
-    /// Turn of gravity about the world's x and y axes (rad).
-    pub angle_rad: [f64; 2],
-    /// Its rate (rad/s).
-    pub rate_rad_s: [f64; 2],
-}
-
-impl Sway {
-    /// A rope at rest.
-    pub const NONE: Self = Self {
-        angle_rad: [0.0; 2],
-        rate_rad_s: [0.0; 2],
-    };
 }
 
 impl<'a> Candidate<'a> {

@@ -1,6 +1,7 @@
 //! The nine rope parameters (the paper's ξ) with their ranges.
 
 use crate::rope_extras::RopeExtras;
+use crate::rope_state::Sway;
 use arm_model::unit_hint;
 use serde::{Deserialize, Serialize};
 
@@ -304,6 +305,9 @@ pub struct FitCircumstances {
     pub camera_position_m: [f64; 3],
     /// Correction of the camera's attitude, a rotation vector in its own frame (rad).
     pub camera_rotation_rad: [f64; 3],
+    /// Swing of the rope at the first frame.
+    #[serde(default)]
+    pub sway: Sway,
 }
 
 /// How far a rope is from those the ranges know.

@@ -1,4 +1,4 @@
-//! How a rope stands and moves at one instant.
+//! How a rope stands and moves at one instant: link by link, or its first mode alone.
 
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +57,25 @@ impl RopeState {
         }
         Err(RopeStateError(links))
     }
+}
+
+/// Swing left in a rope when a motion begins: its first mode in two planes, about. The rope
+/// hangs as it would if gravity were turned, and moves as if that turn were growing.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sway {
+    /// Turn of gravity about the world's x and y axes (rad).
+    pub angle_rad: [f64; 2],
+    /// Its rate (rad/s).
+    pub rate_rad_s: [f64; 2],
+}
+
+impl Sway {
+    /// A rope at rest.
+    pub const NONE: Self = Self {
+        angle_rad: [0.0; 2],
+        rate_rad_s: [0.0; 2],
+    };
 }
 
 #[cfg(test)]

@@ -18,15 +18,22 @@ pub struct MujocoArgs {
     /// most likely rope alone.
     #[arg(long, default_value_t = 0, value_name = "K")]
     pub robust: usize,
+    /// Throw out of the swing of a short wiggle, as `wag run --fast`, where that is worth it.
+    #[arg(long, conflicts_with = "robust")]
+    pub fast: bool,
 }
 
 impl MujocoArgs {
     /// What distinguishes trials made with these from others, beside seed and method.
     pub fn remark(&self) -> String {
         let Self {
-            refinement, robust, ..
+            refinement,
+            robust,
+            fast,
+            ..
         } = self;
         match robust {
+            0 if *fast => format!(", refined {refinement} times, out of the swing"),
             0 => format!(", refined {refinement} times"),
             _ => format!(", refined {refinement} times, robust over {robust} ropes"),
         }

@@ -3,7 +3,7 @@
 use super::beyond::beyond;
 use super::budget::Budget;
 use super::clock::ClockWindow;
-use super::coordinates::{CLOCK, Coordinates, Point, Reach};
+use super::coordinates::{CLOCK, Coordinates, Point, Reach, sway_of};
 use super::error::IdentifyError;
 use super::film::Film;
 use super::linear;
@@ -173,6 +173,7 @@ impl Fit<'_> {
                 noise_across,
                 camera_position_m,
                 camera_rotation_rad,
+                sway: sway_of(&fit.x),
             },
             out_of_distribution,
             warnings: warnings(fit, &self.film, self.clock),

@@ -9,7 +9,7 @@ const MISS_WARN_M: f64 = 0.01;
 const MISS_MAX_M: f64 = 0.05;
 
 /// Upper end of a forecast above which the throw is pointed out as uncertain (m).
-pub const FORECAST_WARN_M: f64 = 0.015;
+const FORECAST_WARN_M: f64 = 0.015;
 
 /// What is wrong with a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,6 +38,22 @@ pub fn shortcoming(plan: &Plan) -> Option<Shortcoming> {
         ),
         is_severe: true,
     })
+}
+
+/// Most by which the swing may widen a forecast (1).
+const SWING_MAX: f64 = 1.3;
+
+/// Whether a throw out of a swing is as good as the same rope's from rest, which is asked for only
+/// where that is in doubt.
+///
+/// # Errors
+/// As those of what is asked for.
+pub fn is_worth_swinging<E>(
+    swinging: &Plan,
+    from_rest: impl FnOnce() -> Result<Plan, E>,
+) -> Result<bool, E> {
+    let reaches_m = swinging.reaches_m();
+    Ok(reaches_m <= FORECAST_WARN_M || reaches_m <= SWING_MAX * from_rest()?.reaches_m())
 }
 
 fn guess(median_m: f64) -> Option<Shortcoming> {

@@ -32,7 +32,7 @@ mod throw;
 mod waypoints;
 
 pub use again::{MISS_STD_M, correction, plan_again};
-pub use assess::{FORECAST_WARN_M, Shortcoming, shortcoming, warnings};
+pub use assess::{Shortcoming, is_worth_swinging, shortcoming, warnings};
 pub use config::{PlanOptions, Robustness, ThrowConfig, ThrowWeights};
 pub use drape::{Drape, DrapeConfig};
 pub use ensemble::{PosteriorEnsemble, TooFewRopes};

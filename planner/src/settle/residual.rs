@@ -79,7 +79,7 @@ impl<'a> ResidualSimulator<'a> {
         let arms: Vec<_> = moves.iter().map(|t| self.prelude.then(t)).collect();
         let candidates: Vec<Candidate<'_>> = arms
             .iter()
-            .map(|arm| Candidate::new(self.rope, arm))
+            .map(|arm| Candidate::new(self.rope, arm).with_sway(self.prelude.sway))
             .collect();
         let rollouts = roll_out(&candidates, &self.options)?;
         Ok(rollouts
@@ -103,7 +103,7 @@ impl<'a> ResidualSimulator<'a> {
             .map(|motion| Perturbation::Motion { motion, distance })
             .collect();
         let family = Family {
-            base: Candidate::new(self.rope, &here),
+            base: Candidate::new(self.rope, &here).with_sway(self.prelude.sway),
             perturbations: &perturbations,
         };
         let found = sensitivity(&family, &self.options)?;

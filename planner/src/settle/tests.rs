@@ -8,6 +8,7 @@ use arm_model::{Cell, JointVector, Limits, Pole};
 use nalgebra::Vector3;
 use rope_sim::{AttachMotion, Candidate, FrameTimes, MeasuredArm, Precision, SimOptions, roll_out};
 use shared_types::RopeParams;
+use shared_types::rope_state::Sway;
 
 /// Damping, stiffness and turn of joint 1 (degrees); the rest is drawn.
 const ROPES: [(f64, f64, f64); 6] = [
@@ -58,6 +59,7 @@ fn request(index: usize) -> SettleRequest {
             ..random_rope(index as u64)
         },
         before: ArmHistory {
+            sway: Sway::NONE,
             times_s,
             q,
             start_s: before.duration_s() + 1.5,

@@ -10,8 +10,8 @@
 mod curved;
 
 use crate::kernel::GRAVITY_M_S2;
-use crate::rollout::Sway;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use shared_types::rope_state::Sway;
 use shared_types::{RopeExtras, RopeParams, RopeState};
 
 /// Most Newton steps; ten are typical.

@@ -3,8 +3,9 @@
 use crate::base_path::steps_between_jumps;
 use crate::error::SimulateError;
 use crate::motion::AttachMotion;
-use crate::rollout::{Candidate, Sway};
+use crate::rollout::Candidate;
 use shared_types::RopeParams;
+use shared_types::rope_state::Sway;
 
 /// Step lengths tried, relative to the one asked for, until motions whose jump times
 /// differ a little are cut into equally many steps.

@@ -65,6 +65,7 @@ pub(super) fn run(args: &OtherRealityArgs) -> Outcome<Option<Value>> {
         experiment: &experiment,
         mujoco,
         robust: args.mujoco.robust,
+        fast: args.mujoco.fast,
     };
     // Rope by rope, with each channel.
     let trial = |number: u64| {

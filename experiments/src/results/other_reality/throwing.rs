@@ -4,14 +4,17 @@ use super::case::Case;
 use super::child::Mujoco;
 use crate::results::experiment::Experiment;
 use anyhow::{Context, anyhow, ensure};
-use arm_model::{Cell, JointTrajectory};
+use arm_model::{Cell, JointTrajectory, Limits};
 use experiments::trials::{KEYPOINTS, alone};
 use nalgebra::Vector3;
+use planner::history::ArmHistory;
 use planner::identify::IdentifyOptions;
 use planner::plan::{
-    MISS_STD_M, PlanOptions, PlanRequest, PosteriorEnsemble, plan_again, simulator_for, warnings,
+    MISS_STD_M, PlanError, PlanOptions, PlanRequest, PosteriorEnsemble, is_worth_swinging,
+    plan_again, simulator_for, warnings,
 };
 use planner::synthetic::{FilmTiming, RopeFilm, SyntheticFilm, project};
+use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
@@ -23,6 +26,13 @@ use std::ops::ControlFlow;
 
 /// Time between kept positions of a film (s).
 const FILM_PERIOD_S: f64 = 1.0 / 240.0;
+/// Time between reports of the joints (s).
+const REPORT_PERIOD_S: f64 = 4e-3;
+/// The joint that wiggles (0-based).
+const WIGGLED: usize = 5;
+/// From a wiggle's end to the throw out of its swing (s): tracking, identification and planning of
+/// `wag run --fast` on two cores.
+const WAITED_S: f64 = 3.0;
 /// Time between positions of the tip in a throw (s); it moves straight in between.
 const THROW_PERIOD_S: f64 = 1e-3;
 
@@ -75,12 +85,37 @@ impl Fate {
     }
 }
 
+impl Wiggled {
+    /// How late the arm followed its setpoints (s), as `wag run` finds from the same.
+    fn lag_s(&self) -> f64 {
+        let differs = |lag_s: f64| {
+            let times_s = (0..).map(|i| f64::from(i) * REPORT_PERIOD_S);
+            let within = times_s.take_while(|t| *t <= self.command.duration_s());
+            let way = |t: f64| self.reported.state_at(t + lag_s).q - self.command.state_at(t).q;
+            within.map(|t| way(t)[WIGGLED].powi(2)).sum::<f64>()
+        };
+        let lags_s = (0..100).map(|i| f64::from(i) * 2e-3);
+        let least = lags_s.min_by(|a, b| differs(*a).total_cmp(&differs(*b)));
+        least.unwrap_or_default()
+    }
+}
+
 /// Films and throws in MuJoCo; identifies and plans with the product's own equations.
 pub(super) struct Reality<'a> {
     pub experiment: &'a Experiment<'a>,
     pub mujoco: Mujoco,
     /// Ropes of the posterior that a first throw is planned for.
     pub robust: usize,
+    /// Whether throws begin out of the swing of a short wiggle, where that is worth it.
+    pub fast: bool,
+}
+
+/// What was filmed, and what its joints reported.
+struct Wiggled {
+    command: JointTrajectory,
+    reported: JointTrajectory,
+    /// How the rope swung at its begin, as identified.
+    sway: Sway,
 }
 
 impl Reality<'_> {
@@ -92,8 +127,8 @@ impl Reality<'_> {
     /// MuJoCo fails. What identification or planning refuses is a fate.
     pub fn identified<const N: usize>(&self, index: u64, case: &Case) -> anyhow::Result<[Fate; N]> {
         // The fit hears what the joints report; the arm is where it is.
-        let wiggle = self.experiment.rig.motion.trajectory();
-        let reported = case.arm.reported(wiggle)?;
+        let command = self.wiggle(case)?;
+        let reported = case.arm.reported(&command)?;
         let filmed = self.film(case, &reported)?;
         let found = match self.identify(index, &filmed, &reported) {
             Ok(found) => found,
@@ -114,7 +149,24 @@ impl Reality<'_> {
             out_of_distribution: found.out_of_distribution.score,
             flagged: found.out_of_distribution.is_flagged(),
         };
-        self.thrown(index, case, (rope, ensemble), Some(fit))
+        let wiggled = Wiggled {
+            command,
+            reported,
+            sway: found.circumstances.sway,
+        };
+        self.thrown(index, case, (rope, ensemble), Some((fit, &wiggled)))
+    }
+
+    /// As `wag run` wiggles.
+    fn wiggle(&self, case: &Case) -> anyhow::Result<JointTrajectory> {
+        if !self.fast {
+            return Ok(*self.experiment.rig.motion.trajectory());
+        }
+        let config = self.experiment.config.clone();
+        let short = config
+            .with_short_wiggle(Task::Strike, case.target_m)?
+            .wiggle;
+        Ok(wiggle(&short, &Limits::default())?)
     }
 
     /// Trial `index`: planned for `rope`, whichever it is, and thrown with the case's.
@@ -131,11 +183,12 @@ impl Reality<'_> {
         index: u64,
         case: &Case,
         (rope, ensemble): (&RopeParams, PosteriorEnsemble),
-        fit: Option<Fit>,
+        filmed: Option<(Fit, &Wiggled)>,
     ) -> anyhow::Result<[Fate; N]> {
         let request = self.request(index, case, rope, ensemble);
-        let go_on = &mut |_| ControlFlow::Continue(());
-        let mut planned = planner::plan(&request, go_on).context("planning");
+        let (fit, wiggled) = filmed.unzip();
+        let swinging = wiggled.filter(|_| self.fast);
+        let mut planned = planned(&request, swinging).context("planning");
         let mut rng = ChaCha12Rng::seed_from_u64(case.seed);
         let mut fates = Vec::with_capacity(N);
         for throw in 0..N as u64 {
@@ -146,7 +199,7 @@ impl Reality<'_> {
                     break;
                 }
             };
-            let miss = self.throw(case, &plan, throw)?;
+            let miss = self.throw(case, &plan, (throw, wiggled))?;
             fates.push(Fate::Thrown(Thrown {
                 miss_m: miss.norm(),
                 predicted_m: plan.predicted_error_m,
@@ -168,7 +221,7 @@ impl Reality<'_> {
     }
 
     fn film(&self, case: &Case, reported: &JointTrajectory) -> anyhow::Result<SyntheticFilm> {
-        let timing = FilmTiming::default();
+        let timing = timing_of(reported);
         let times = FrameTimes {
             first_s: 0.0,
             period_s: FILM_PERIOD_S,
@@ -232,8 +285,14 @@ impl Reality<'_> {
         }
     }
 
-    /// Tip minus target at their closest (m) in throw `number`, watched as long as a plan is.
-    fn throw(&self, case: &Case, planned: &Plan, number: u64) -> anyhow::Result<Vector3<f64>> {
+    /// Tip minus target at their closest (m) in throw `number`, watched as long as a plan is; one
+    /// out of a swing after the wiggle that left it.
+    fn throw(
+        &self,
+        case: &Case,
+        planned: &Plan,
+        (number, wiggled): (u64, Option<&Wiggled>),
+    ) -> anyhow::Result<Vector3<f64>> {
         let config = &self.experiment.config;
         let goal = config.goal(Task::Strike, case.target_m);
         let (task, params) = (goal.task(), &case.rope.params);
@@ -241,21 +300,75 @@ impl Reality<'_> {
         let reported = case.arm.reported(&planned.trajectory)?;
         let motion_s = reported.duration_s().max(simulator.motion_s_min);
         let watched_s = motion_s + task.config().observed_s;
-        let times = FrameTimes {
+        let mut times = FrameTimes {
             first_s: 0.0,
             period_s: THROW_PERIOD_S,
             count: (watched_s / THROW_PERIOD_S).floor() as usize + 1,
         };
         let mut rope = case.rope;
-        // It was left to come to rest.
-        rope.sway = Sway::NONE;
-        let motion = |t_s| case.arm.attach_frame(&reported, t_s);
-        // And hangs in another of the shapes that friction holds.
-        let seed = case.seed.wrapping_add(1 + number);
-        let ends = self.mujoco.simulate(&rope, motion, seed, &times, 2)?;
+        let swings = wiggled.filter(|_| planned.start.is_some());
+        let ends = if let Some(wiggled) = swings {
+            times.first_s = wiggled.command.duration_s() + WAITED_S;
+            let motion = |t_s: f64| {
+                let since_s = t_s - times.first_s;
+                let (made, at_s) = if since_s < 0.0 {
+                    (&wiggled.reported, t_s)
+                } else {
+                    (&reported, since_s)
+                };
+                case.arm.attach_frame(made, at_s)
+            };
+            self.mujoco.simulate(&rope, motion, case.seed, &times, 2)?
+        } else {
+            // It was left to come to rest.
+            rope.sway = Sway::NONE;
+            let motion = |t_s| case.arm.attach_frame(&reported, t_s);
+            // And hangs in another of the shapes that friction holds.
+            let seed = case.seed.wrapping_add(1 + number);
+            self.mujoco.simulate(&rope, motion, seed, &times, 2)?
+        };
         let tip: Vec<_> = ends.chunks_exact(2).map(|ends| ends[1]).collect();
         Ok(closest(&tip, &case.target_m.into()))
     }
+}
+
+/// Frames of a motion's film: the paper's 400 at most.
+fn timing_of(motion: &JointTrajectory) -> FilmTiming {
+    let usual = FilmTiming::default();
+    FilmTiming {
+        frames: usual
+            .frames
+            .min((usual.rate_hz * motion.duration_s()) as usize),
+        ..usual
+    }
+}
+
+/// The plan of a throw: out of the swing that a wiggle left, where there was one and that is
+/// worth it.
+fn planned(request: &PlanRequest, wiggled: Option<&Wiggled>) -> Result<Plan, PlanError> {
+    let plan = |request: &PlanRequest| planner::plan(request, &mut |_| ControlFlow::Continue(()));
+    let Some(wiggled) = wiggled else {
+        return plan(request);
+    };
+    let reported = &wiggled.reported;
+    let times_s = (0..).map(|i| f64::from(i) * REPORT_PERIOD_S);
+    let times_s: Vec<f64> = times_s
+        .take_while(|t| *t <= reported.duration_s())
+        .collect();
+    let swinging = plan(&PlanRequest {
+        before: Some(ArmHistory {
+            sway: wiggled.sway,
+            q: times_s.iter().map(|t| reported.state_at(*t).q).collect(),
+            times_s,
+            start_s: wiggled.command.duration_s() + WAITED_S + wiggled.lag_s(),
+            start_q: wiggled.command.end(),
+        }),
+        ..request.clone()
+    })?;
+    let mut calm = None;
+    let from_rest = || plan(request).inspect(|plan| calm = Some(plan.clone()));
+    let is_worth = is_worth_swinging(&swinging, from_rest)?;
+    Ok(calm.filter(|_| !is_worth).unwrap_or(swinging))
 }
 
 /// From a point to the nearest place on the straight lines between the points of a path (m);

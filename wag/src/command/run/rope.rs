@@ -16,6 +16,7 @@ use rt_controller::control::arming::THROW_WITHIN_NS;
 use rt_controller::os::now_ns;
 use run_log::{Film, Settled, Tracked, confirm, files};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, RopeAppearance};
+use shared_types::rope_state::Sway;
 use shared_types::{MonotonicNs, OperatingMode, Plan, RopeParams};
 use std::time::Duration;
 
@@ -282,11 +283,13 @@ impl Run<'_> {
         self.session.received.drain()?;
         let cycles = &self.session.received.cycles;
         let joints = cycles.joints_between(film.first_stamp_ns, u64::MAX);
-        // The rope hangs still at the first joint sample.
+        // Within a period of the joints' reports of the first frame, at which the swing is told.
         let epoch = joints.first().map_or(start, |(ns, _)| MonotonicNs(*ns));
         let since_epoch = |(ns, q): &(u64, _)| (MonotonicNs(*ns).since_s(epoch), *q);
         let (times_s, q) = joints.iter().map(since_epoch).unzip();
+        let told = self.record.identified.as_ref();
         Ok(ArmHistory {
+            sway: told.map_or(Sway::NONE, |rope| rope.circumstances.sway),
             times_s,
             q,
             start_s: start.since_s(epoch),

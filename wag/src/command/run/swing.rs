@@ -6,7 +6,7 @@ use super::stages::Run;
 use crate::command::known_rope::KnownRope;
 use crate::pipeline::arm_for;
 use arm_model::JointTrajectory;
-use planner::plan::FORECAST_WARN_M;
+use planner::plan::is_worth_swinging;
 use rt_controller::os::now_ns;
 use run_log::Film;
 use shared_types::{MonotonicNs, OperatingMode, Plan};
@@ -21,9 +21,6 @@ const QUESTION: (&str, &str) = (
 const PLANNING_S: [f64; 2] = [0.45, 1.8];
 /// Least of it that must be left to arm and to begin the film (s).
 const LEFT_MIN_S: f64 = 0.1;
-/// Most by which the swing may widen a forecast (1).
-const WORSE_MAX: f64 = 1.3;
-
 impl Run<'_> {
     /// Throws out of the swing, if the run is to be fast: plan and film. Where that promises too
     /// little, or there is no time for it, nothing is thrown, and the rope is to be calmed.
@@ -42,7 +39,7 @@ impl Run<'_> {
         let asked = self.setup.asks.then_some(QUESTION);
         let confirmed_ns = self.session.confirm_and_hold(asked)?;
         let [mut planning_s, longest_s] = PLANNING_S;
-        let mut most_m = FORECAST_WARN_M;
+        let mut is_worth = false;
         let why = loop {
             let begin = MonotonicNs(now_ns()).plus_s(planning_s);
             if begin.since_s(MonotonicNs(confirmed_ns)) > CONFIRMED_S {
@@ -53,17 +50,17 @@ impl Run<'_> {
             let start = begin.plus_s(lag_s.unwrap_or_default());
             let before = self.history(film, wiggle.end(), start)?;
             let plan = self.plan(rope, Some(before))?;
-            let reaches_m = plan.reaches_m();
-            if reaches_m > most_m {
-                // What is as uncertain of a rope at rest, calming does not mend.
-                let calm_m = most_m.max(WORSE_MAX * self.plan(rope, None)?.reaches_m());
-                if reaches_m <= calm_m {
-                    most_m = calm_m;
-                    continue;
-                }
-                break format!("the forecast reaches up to {:.1} cm", 100.0 * reaches_m);
+            // What is as uncertain of a rope at rest, calming does not mend.
+            is_worth = is_worth || is_worth_swinging(&plan, || self.plan(rope, None))?;
+            if !is_worth {
+                break format!(
+                    "the forecast reaches up to {:.1} cm",
+                    100.0 * plan.reaches_m()
+                );
             }
             if begin.since_s(MonotonicNs(now_ns())) > LEFT_MIN_S {
+                // The one from rest may lie there.
+                self.keep_plan(&plan)?;
                 let (session, mode) = (&mut *self.session, OperatingMode::Throw);
                 arm_for(session, &self.arm, mode, Some(confirmed_ns))?;
                 if let Some(throw) = self.throw_armed(&plan, Some(begin))? {
