@@ -108,15 +108,20 @@ impl Prelude {
     pub(crate) fn lead_to(
         &self,
         ropes: &[RopeParams],
-        threads: usize,
+        (precision, threads): (Precision, usize),
     ) -> Result<Vec<Option<RopeState>>, HistoryError> {
         let arm = &self.measured;
         let led = |rope| Candidate::new(rope, arm).with_sway(self.sway);
         let candidates: Vec<_> = ropes.iter().map(led).collect();
+        // A prediction begins with a state as exact as it is.
+        let step_s = match precision {
+            Precision::F32 => STEP_S,
+            Precision::F64 => STEP_S / 4.0,
+        };
         let options = SimOptions {
             keeps_end: true,
             threads,
-            ..SimOptions::new(STEP_S, Precision::F32, self.start_s)
+            ..SimOptions::new(step_s, precision, self.start_s)
         };
         let rollouts = roll_out(&candidates, &options)?;
         Ok(rollouts.into_iter().map(|r| r.end).collect())

@@ -43,17 +43,26 @@ pub fn shortcoming(plan: &Plan) -> Option<Shortcoming> {
 /// Most by which the swing may widen a forecast (1).
 const SWING_MAX: f64 = 1.3;
 
-/// Whether a throw out of a swing is as good as the same rope's from rest, which is asked for only
-/// where that is in doubt.
+/// Whether a throw out of a swing is as good as the same rope's from rest, of which the upper end
+/// of the forecast is `resting_m` (m); it is asked for once, where that is in doubt. Never
+/// without a forecast, or with one that reaches 5 cm.
 ///
 /// # Errors
 /// As those of what is asked for.
 pub fn is_worth_swinging<E>(
     swinging: &Plan,
+    resting_m: &mut Option<f64>,
     from_rest: impl FnOnce() -> Result<Plan, E>,
 ) -> Result<bool, E> {
     let reaches_m = swinging.reaches_m();
-    Ok(reaches_m <= FORECAST_WARN_M || reaches_m <= SWING_MAX * from_rest()?.reaches_m())
+    if reaches_m <= FORECAST_WARN_M || reaches_m > MISS_MAX_M {
+        return Ok(reaches_m <= FORECAST_WARN_M);
+    }
+    let resting_m = match *resting_m {
+        Some(known_m) => known_m,
+        None => *resting_m.insert(from_rest()?.reaches_m()),
+    };
+    Ok(reaches_m <= SWING_MAX * resting_m)
 }
 
 fn guess(median_m: f64) -> Option<Shortcoming> {
@@ -95,6 +104,9 @@ pub fn warnings(plan: &Plan) -> Vec<String> {
     let wide = wide.map(|f| {
         let cause = match (plan.aim, plan.task) {
             (Some(_), _) => "so much may be left of the last miss; correct it once more",
+            (None, _) if plan.start.is_some() => {
+                "the short film leaves open, or the model does not explain, how this rope moves; identify it by the whole wiggle (without `--fast`), with its tip weighed (`--lead-mass`) or its length measured (`--length`)"
+            }
             (None, Task::Strike) => {
                 "the film leaves open, or the model does not explain, how this rope moves; identify it with its tip weighed (`wag identify --lead-mass`), its length measured (`--length`) or a gentler wiggle, or correct the throw by its miss (`wag plan again`)"
             }
@@ -113,6 +125,43 @@ pub fn warnings(plan: &Plan) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_swing_may_widen_a_forecast_by_a_third_of_what_is_uncertain_at_rest() {
+        let goal = crate::PlannerConfig::default().goal(Task::Strike, [0.95, 0.0, 0.2]);
+        let rope = crate::ropes::trial_rope(9_401, 0);
+        let request = crate::plan::PlanRequest::new(goal, &rope, Default::default());
+        let found = crate::plan(&request, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
+        let reaching = |high_m: f64| Plan {
+            forecast: Some(shared_types::ErrorForecast {
+                ropes: 64,
+                failed: 0,
+                mean_m: 0.01,
+                median_m: 0.01,
+                interval_90_m: [0.0, high_m],
+            }),
+            ..found.clone()
+        };
+        let is_worth = |swinging_m, resting_m| {
+            let from_rest = || Ok::<_, ()>(reaching(resting_m));
+            is_worth_swinging(&reaching(swinging_m), &mut None, from_rest)
+        };
+        assert_eq!(is_worth(0.025, 0.02), Ok(true));
+        assert_eq!(is_worth(0.027, 0.02), Ok(false));
+        // What is certain enough needs no comparison; what was compared is not asked for again.
+        let fails = |swinging_m, mut known| {
+            is_worth_swinging(&reaching(swinging_m), &mut known, || Err(()))
+        };
+        assert_eq!(fails(0.014, None), Ok(true));
+        assert_eq!(fails(0.03, None), Err(()));
+        assert_eq!(fails(0.03, Some(0.02)), Ok(false));
+        assert_eq!(is_worth(0.051, 1.0), Ok(false));
+        // Nothing is known of a plan without a forecast.
+        assert_eq!(
+            is_worth_swinging(&found, &mut None, || Ok::<_, ()>(found.clone())),
+            Ok(false)
+        );
+    }
 
     #[test]
     fn a_miss_is_reported_and_a_large_one_is_severe() {

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
-use rope_sim::ClosestApproach;
+use rope_sim::{ClosestApproach, Precision};
 use shared_types::ErrorForecast;
 use shared_types::ipc::message::Progress;
 use std::ops::ControlFlow;
@@ -139,7 +139,7 @@ impl Setup<'_> {
         trajectory: &JointTrajectory,
     ) -> Result<Option<ErrorForecast>, PlanError> {
         let ensemble = &self.request.ensemble;
-        let states = self.may_lead_to(&ensemble.forecast)?;
+        let states = self.may_lead_to(&ensemble.forecast, Precision::F32)?;
         // One that diverged on the way counts as one that cannot be thrown.
         let known = |i: usize| states.get(i).is_none_or(Option::is_some);
         let ropes = ensemble.forecast.iter().enumerate();

@@ -12,6 +12,7 @@ use crate::history::{ArmHistory, HistoryError, Prelude};
 use arm_model::geometry::Capsule;
 use arm_model::{Cell, JointTrajectory, JointVector};
 use nalgebra::Vector3;
+use rope_sim::Precision;
 use shared_types::{RopeParams, RopeState};
 
 /// A point of the search's space with its trajectory.
@@ -176,7 +177,7 @@ impl<'a> Setup<'a> {
     /// # Errors
     /// What the simulator refuses; the simulation of one diverges.
     pub(super) fn led_to(&self, ropes: &[RopeParams]) -> Result<Vec<RopeState>, PlanError> {
-        let states = self.may_lead_to(ropes)?.into_iter();
+        let states = self.may_lead_to(ropes, Precision::F64)?.into_iter();
         let states = states.collect::<Option<_>>();
         Ok(states.ok_or(HistoryError::Diverged)?)
     }
@@ -185,11 +186,12 @@ impl<'a> Setup<'a> {
     pub(super) fn may_lead_to(
         &self,
         ropes: &[RopeParams],
+        precision: Precision,
     ) -> Result<Vec<Option<RopeState>>, PlanError> {
         let Some(prelude) = &self.prelude else {
             return Ok(Vec::new());
         };
-        Ok(prelude.lead_to(ropes, self.request.options.threads)?)
+        Ok(prelude.lead_to(ropes, (precision, self.request.options.threads))?)
     }
 
     /// Fitness `f(τ)` of one simulated throw.

@@ -79,7 +79,8 @@ pub fn fraction_that_lasts(
     limits: &Limits,
 ) -> Result<f64, MoveError> {
     const LEAST: f64 = 1e-3;
-    let fastest_s = plan_move(from, to, 1.0, limits)?.duration_s();
+    // Not slowed down for the tool's speed: time scales with the fraction, exactly.
+    let fastest_s = generate(from, to, 1.0, limits)?.duration_s();
     Ok((fastest_s / duration_s).clamp(LEAST, 1.0))
 }
 
@@ -191,6 +192,20 @@ mod tests {
             prop_assert_eq!(motion.start(), from);
             prop_assert_eq!(motion.state_at(motion.duration_s()).q, to);
             prop_assert_eq!(verify(&motion, &limits), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_move_lasts_as_long_as_is_asked_or_as_the_limits_allow() {
+        let mut to = START_POSE;
+        (to[0], to[5]) = (to[0] + 0.4, to[5] - 0.1);
+        let limits = Limits::default();
+        for (wanted_s, lasts_s) in [(3.5, Some(3.5)), (0.01, None)] {
+            let part = fraction_that_lasts(&START_POSE, &to, wanted_s, &limits).unwrap();
+            let motion = plan_move(&START_POSE, &to, part, &limits).unwrap();
+            let fastest = plan_move(&START_POSE, &to, 1.0, &limits).unwrap();
+            let lasts_s = lasts_s.unwrap_or_else(|| fastest.duration_s());
+            assert!((motion.duration_s() - lasts_s).abs() < 1e-3, "{wanted_s}");
         }
     }
 

@@ -54,8 +54,9 @@ pub struct RunArgs {
     #[arg(long, default_value_t = 0, value_name = "K")]
     pub robust: usize,
     /// Strike out of the swing that a short wiggle leaves, without calming the rope: half the
-    /// time. The rope is calmed where the forecast is too wide, with a warning.
-    #[arg(long, conflicts_with_all = ["from", "again", "robust"])]
+    /// time. It is calmed, with a warning, where the forecast is too wide or the plan too late.
+    /// For simulated arms so far.
+    #[arg(long, conflicts_with_all = ["from", "again", "robust", "keep_films", "hold_to_run"])]
     pub fast: bool,
     /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]
@@ -120,7 +121,7 @@ pub struct DemoArgs {
     #[arg(long, value_name = "FILE")]
     pub rig_config: Option<PathBuf>,
     /// Strike out of the swing that a short wiggle leaves, without calming the rope: half the
-    /// time. The rope is calmed where the forecast is too wide, with a warning.
+    /// time. It is calmed, with a warning, where the forecast is too wide or the plan too late.
     #[arg(long, conflicts_with = "again")]
     pub fast: bool,
     /// Go on although the track of the rope is unconfirmed.

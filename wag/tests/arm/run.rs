@@ -118,6 +118,8 @@ fn a_strike_out_of_the_swing_is_thrown_at_its_instant_and_at_no_other() {
     let state = plan.start.as_ref().unwrap();
     assert_eq!(state.check(plan.rope.links), Ok(()));
     assert!(here.join("fast/report.html").exists());
+    let asked = refused_in(here, 2, &format!("run --fast {arm} --ask --out other"));
+    assert!(asked.contains("simulated arms so far"), "{asked}");
     for again in ["--again fast", "--from throw fast"] {
         let refused = refused_in(here, 2, &format!("run {again} {arm} --out other"));
         assert!(refused.contains("still swung"), "{refused}");

@@ -367,7 +367,7 @@ fn planned(request: &PlanRequest, wiggled: Option<&Wiggled>) -> Result<Plan, Pla
     })?;
     let mut calm = None;
     let from_rest = || plan(request).inspect(|plan| calm = Some(plan.clone()));
-    let is_worth = is_worth_swinging(&swinging, from_rest)?;
+    let is_worth = is_worth_swinging(&swinging, &mut None, from_rest)?;
     Ok(calm.filter(|_| !is_worth).unwrap_or(swinging))
 }
 

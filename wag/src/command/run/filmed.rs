@@ -16,7 +16,7 @@ use shared_types::ipc::message::{CameraEvent, CameraRequest, RigEvent, RigReques
 use shared_types::{MonotonicNs, OperatingMode, Plan, Task, Verdict};
 use std::time::Duration;
 
-/// Most frames of a wiggle (paper: 400 at 60 Hz).
+/// Frames of a wiggle, of a fast one at most (paper: 400 at 60 Hz).
 const WIGGLE_FRAMES: u32 = 400;
 /// Frames of a strike: two and a half seconds.
 const STRIKE_FRAMES: u32 = 150;
@@ -24,8 +24,6 @@ const STRIKE_FRAMES: u32 = 150;
 const AFTER_STRIKE_S: f64 = 0.6;
 /// Time for putting a board or a wall in its place.
 const PLACED_WITHIN: Duration = Duration::from_secs(900);
-/// Longest a film takes of which nothing came (s).
-const FILMED_WITHIN_S: f64 = 15.0;
 /// From the first frame of a film to the motion's begin, at most (s).
 const BEFORE_THROW_S: f64 = 0.4;
 
@@ -50,10 +48,11 @@ impl Run<'_> {
             CameraEvent::Recording { first_stamp_ns } => first_stamp_ns,
             other => bail!("the camera process answered a recording with {other:?}"),
         };
+        let within_s = f64::from(frames) / 15.0 + 5.0;
         if let Some(begin) = begin
             && !(self.wait_for(begin)? && self.session.is_held())
         {
-            self.session.finish(&recording, FILMED_WITHIN_S, |_| ())?;
+            self.session.finish(&recording, within_s, |_| ())?;
             return Ok(None);
         }
         let stream = |session: &mut Session| execute(session, &self.arm, trajectory);
@@ -62,7 +61,6 @@ impl Run<'_> {
         } else {
             stream(self.session)?
         };
-        let within_s = f64::from(frames) / 15.0 + 5.0;
         let event = self.session.finish(&recording, within_s, |event| {
             if let CameraEvent::Progress(p) = event {
                 stage.progress(p);
@@ -118,8 +116,11 @@ impl Run<'_> {
     pub fn wiggle(&mut self, wiggle: &JointTrajectory) -> anyhow::Result<Film> {
         self.arm_for(OperatingMode::Wiggle)?;
         let stage = Stage::begin("wiggle");
-        let lasts = (f64::from(RATE_HZ) * wiggle.duration_s()) as u32;
-        let film = self.film(lasts.min(WIGGLE_FRAMES), wiggle, (false, None), &stage)?;
+        let mut frames = WIGGLE_FRAMES;
+        if self.setup.fast {
+            frames = frames.min((f64::from(RATE_HZ) * wiggle.duration_s()) as u32);
+        }
+        let film = self.film(frames, wiggle, (false, None), &stage)?;
         let film = film.context("a wiggle begins at once")?;
         self.record.set_wiggle(film);
         self.record.stages.wiggle_s = stage.done(&film.describe());

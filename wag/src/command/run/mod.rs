@@ -213,6 +213,11 @@ fn on_camera(
             inputs.task.name()
         ));
     }
+    if inputs.fast && asks(arm, &address) {
+        return Err(bad_input!(
+            "--fast is for simulated arms so far, without --ask: the controller cannot yet refuse a throw that begins late; leave --fast out"
+        ));
+    }
     let operator = operator(arm, &address)?;
     require_clear_area(arm, &address, "MOVE")?;
     watch_interrupts().or_failed()?;

@@ -34,7 +34,7 @@ const UNASKED_S: [f64; 2] = [2.0, 32.0];
 /// The same of a move that must begin soon after it was confirmed.
 const ASKED_S: [f64; 2] = [2.0, 8.0];
 /// Latest begin after it was confirmed (s), with half a second for the controller to hear of it.
-pub(super) const CONFIRMED_S: f64 = THROW_WITHIN_NS as f64 * 1e-9 - 0.5;
+const CONFIRMED_S: f64 = THROW_WITHIN_NS as f64 * 1e-9 - 0.5;
 /// How long the rope is watched for its stillness where somebody waits (s).
 const WATCHED_S: f64 = 15.0;
 /// What an operator confirms before it.

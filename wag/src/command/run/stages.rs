@@ -196,10 +196,7 @@ impl<'a> Run<'a> {
                 }
             }
         };
-        let throw = match thrown {
-            Some(throw) => throw,
-            None => self.throw(&plan)?,
-        };
+        let throw = thrown.map_or_else(|| self.throw(&plan), Ok)?;
         if throw.frames > 0 {
             self.score(&throw, &plan);
         }

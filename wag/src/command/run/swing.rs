@@ -1,7 +1,6 @@
 //! A throw out of the swing that the wiggle leaves: the rope is not calmed, and the arm does
 //! not move in between. Where the rope will be is simulated with what was identified.
 
-use super::rope::CONFIRMED_S;
 use super::stages::Run;
 use crate::command::known_rope::KnownRope;
 use crate::pipeline::arm_for;
@@ -9,16 +8,14 @@ use arm_model::JointTrajectory;
 use planner::plan::is_worth_swinging;
 use rt_controller::os::now_ns;
 use run_log::Film;
+use shared_types::ipc::message::ControllerRequest;
 use shared_types::{MonotonicNs, OperatingMode, Plan};
 
-/// What an operator is asked once the rope is identified.
-const QUESTION: (&str, &str) = (
-    "The arm stands at the start, and the rope swings. Unless that leaves too much open, it will throw within ten seconds of your word.",
-    "THROW",
-);
 /// Time allowed for planning before the throw begins, and the longest after plans that came too
 /// late, each twice as long (s).
 const PLANNING_S: [f64; 2] = [0.45, 1.8];
+/// Longest swing, from the wiggle's end to the throw, that is predicted (s).
+const SWINGS_S: f64 = 15.0;
 /// Least of it that must be left to arm and to begin the film (s).
 const LEFT_MIN_S: f64 = 0.1;
 impl Run<'_> {
@@ -36,42 +33,51 @@ impl Run<'_> {
         if let Some(target_m) = self.record.target_m {
             self.place(target_m)?;
         }
-        let asked = self.setup.asks.then_some(QUESTION);
-        let confirmed_ns = self.session.confirm_and_hold(asked)?;
         let [mut planning_s, longest_s] = PLANNING_S;
-        let mut is_worth = false;
+        let (mut resting_m, told) = (None, self.record.warnings.len());
         let why = loop {
+            self.record.warnings.truncate(told);
             let begin = MonotonicNs(now_ns()).plus_s(planning_s);
-            if begin.since_s(MonotonicNs(confirmed_ns)) > CONFIRMED_S {
-                break "the confirmation is too old".to_owned();
+            if planning_s > longest_s || begin.since_s(MonotonicNs(film.motion.end_ns)) > SWINGS_S {
+                break "planning takes too long here".to_owned();
             }
+            planning_s *= 2.0;
             // A response that is known begins with the arm's delay.
-            let lag_s = self.record.arm_lag_s.filter(|_| self.following.is_none());
-            let start = begin.plus_s(lag_s.unwrap_or_default());
-            let before = self.history(film, wiggle.end(), start)?;
-            let plan = self.plan(rope, Some(before))?;
+            let known = self.following.as_ref().map(|_| 0.0);
+            let Some(lag_s) = known.or(self.record.arm_lag_s) else {
+                break "how late the arm follows is not known".to_owned();
+            };
+            let before = self.history(film, wiggle.end(), begin.plus_s(lag_s))?;
+            let plan = match self.plan(rope, Some(before)) {
+                Ok(plan) => plan,
+                Err(refusal) => break format!("{refusal:#}"),
+            };
             // What is as uncertain of a rope at rest, calming does not mend.
-            is_worth = is_worth || is_worth_swinging(&plan, || self.plan(rope, None))?;
-            if !is_worth {
+            if !is_worth_swinging(&plan, &mut resting_m, || self.plan(rope, None))? {
                 break format!(
                     "the forecast reaches up to {:.1} cm",
                     100.0 * plan.reaches_m()
                 );
             }
-            if begin.since_s(MonotonicNs(now_ns())) > LEFT_MIN_S {
-                // The one from rest may lie there.
-                self.keep_plan(&plan)?;
-                let (session, mode) = (&mut *self.session, OperatingMode::Throw);
-                arm_for(session, &self.arm, mode, Some(confirmed_ns))?;
-                if let Some(throw) = self.throw_armed(&plan, Some(begin))? {
-                    return Ok(Some((plan, throw)));
-                }
+            if begin.since_s(MonotonicNs(now_ns())) < LEFT_MIN_S {
+                continue;
             }
-            if planning_s >= longest_s {
-                break "planning takes too long here".to_owned();
+            // One from rest, or of another instant, may lie there, with what is poor about it.
+            self.record.warnings.truncate(told);
+            self.keep_plan(&plan)?;
+            arm_for(
+                self.session,
+                &self.arm,
+                OperatingMode::Throw,
+                Some(now_ns()),
+            )?;
+            if let Some(throw) = self.throw_armed(&plan, Some(begin))? {
+                return Ok(Some((plan, throw)));
             }
-            planning_s *= 2.0;
+            self.session
+                .ask(&self.arm, &ControllerRequest::Disarm, 5.0, |_| ())?;
         };
+        self.record.warnings.truncate(told);
         self.warn(&format!("the rope is calmed before the throw: {why}"));
         self.setup.fast = false;
         Ok(None)
