@@ -3,11 +3,11 @@
 use arm_model::joint::START_POSE;
 use arm_model::{Cell, Limits, Pole};
 use planner::PlannerConfig;
+use planner::history::ArmHistory;
 use planner::observation::Appearance;
 use planner::plan::PlanRequest;
 use planner::ropes::random_rope;
 use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
-use planner::history::ArmHistory;
 use planner::settle::SettleRequest;
 use planner::synthetic::side_camera;
 use serde::Serialize;
