@@ -222,7 +222,7 @@ impl RunRecord {
         self.throw_late_s = late_s;
         if let Some(late_s) = late_s.filter(|s| s.abs() > LATE_MAX_S) {
             self.warnings.push(format!(
-                "the throw began {:.0} ms later than planned, when the rope had swung on",
+                "the throw began {:+.0} ms off the instant that it was planned for: the rope was elsewhere",
                 1e3 * late_s
             ));
         }
