@@ -66,21 +66,19 @@ impl PlannerConfig {
         self
     }
 
-    /// The same with a short wiggle in the start pose of a strike, which can begin out of the
-    /// swing that is left.
+    /// A short wiggle in the start pose of a strike, which can begin out of the swing that is left.
     ///
     /// # Errors
     /// Another task: its search takes longer than a swing can be predicted for.
-    pub fn with_short_wiggle(
-        mut self,
+    pub fn short_wiggle(
+        &self,
         task: Task,
         target_m: [f64; 3],
-    ) -> Result<Self, NotOutOfSwing> {
+    ) -> Result<WiggleConfig, NotOutOfSwing> {
         if task != Task::Strike {
             return Err(NotOutOfSwing(task.name()));
         }
-        self.wiggle = self.wiggle.short(start_pose_for(target_m));
-        Ok(self)
+        Ok(self.wiggle.short(start_pose_for(target_m)))
     }
 }
 

@@ -359,6 +359,14 @@ pub struct RopeEstimate {
     pub warnings: Vec<String>,
 }
 
+impl RopeEstimate {
+    /// Whether nothing speaks against relying on it.
+    #[must_use]
+    pub const fn is_reliable(&self) -> bool {
+        self.warnings.is_empty()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,7 +1,7 @@
 //! The operator: silent, killed, or letting go of the dead-man switch.
 
 use super::child::{Process, Role};
-use super::stand::{Stand, arm_for};
+use super::stand::{Stand, arm_for, execute, swing};
 use rt_controller::config::EnablingInput;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::ipc::{ControllerMode, OperatorEnd};
@@ -102,6 +102,43 @@ fn an_arming_wants_a_fresh_confirmation_given_to_an_arm_at_rest() {
     let (fault, message) = stand.refused(&swing);
     assert_eq!(fault, FaultCode::ArmingExpired);
     assert!(message.contains("ran out"), "{message}");
+    stand.finish();
+}
+
+/// A throw that was planned for an instant is another one later: also where only the slow move to
+/// its start made it late.
+#[test]
+fn what_is_to_begin_by_an_instant_does_not_begin_later() {
+    let mut stand = Stand::ready("begins_by");
+    let arming = |by_s: f64| {
+        let now = clock::now();
+        ControllerRequest::Arm {
+            operating_mode: OperatingMode::Throw,
+            confirmed_ns: Some(now.0),
+            begins_by_ns: Some(now.plus_s(by_s).0),
+        }
+    };
+    assert_eq!(stand.refused(&arming(-0.1)).0, FaultCode::ArmingExpired);
+    assert_eq!(stand.ask(&arming(0.2)), ControllerEvent::Done);
+    stand.rest(Duration::from_millis(300));
+    let late = stand.swing_here();
+    assert_eq!(stand.refused(&late).0, FaultCode::ArmingExpired);
+    let mut aside = stand.commanded();
+    aside[6] += 0.005;
+    assert_eq!(stand.ask(&arming(0.1)), ControllerEvent::Done);
+    let (fault, _) = stand.refused(&execute(&swing(aside)));
+    assert!(matches!(
+        fault,
+        FaultCode::ArmingExpired | FaultCode::NotArmed
+    ));
+    let moved_rad = (stand.commanded()[6] - aside[6]).abs();
+    assert!(
+        moved_rad < 1e-6,
+        "the move to the start was made, {moved_rad} rad"
+    );
+    assert_eq!(stand.ask(&arming(5.0)), ControllerEvent::Done);
+    let punctual = stand.swing_here();
+    stand.moves(&punctual);
     stand.finish();
 }
 

@@ -62,6 +62,7 @@ pub fn arm_for(operating_mode: OperatingMode, confirmed: Option<MonotonicNs>) ->
     ControllerRequest::Arm {
         operating_mode,
         confirmed_ns: confirmed.map(|at| at.0),
+        begins_by_ns: None,
     }
 }
 

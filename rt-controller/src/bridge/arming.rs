@@ -26,7 +26,7 @@ impl Bridge {
         &mut self,
         call: ControllerCall,
         operating_mode: OperatingMode,
-        confirmed_ns: Option<u64>,
+        (confirmed_ns, begins_by_ns): (Option<u64>, Option<u64>),
     ) {
         if self.mode() != ControllerMode::Idle || self.moves() {
             return self.wrong_mode(&call, "it is armed when it is Idle");
@@ -50,7 +50,8 @@ impl Bridge {
         self.confirmed_ns = confirmed_ns;
         let arming = Arming {
             operating_mode,
-            expires_ns,
+            // The loop itself refuses what begins later, in whatever cycle it would.
+            expires_ns: begins_by_ns.map_or(expires_ns, |by| by.min(expires_ns)),
             area_clear: confirmed_ns.is_some(),
         };
         self.pass_on(call, ControlCommand::Arm(arming), None, Awaited::Armed);

@@ -63,7 +63,8 @@ impl Bridge {
             ControllerRequest::Arm {
                 operating_mode,
                 confirmed_ns,
-            } => self.serve_arming(call, operating_mode, confirmed_ns),
+                begins_by_ns,
+            } => self.serve_arming(call, operating_mode, (confirmed_ns, begins_by_ns)),
             ControllerRequest::Disarm => match self.command(ControlCommand::Disarm, None) {
                 Ok(()) => {
                     // With its next cycle.

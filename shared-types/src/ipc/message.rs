@@ -58,6 +58,9 @@ pub enum ControllerRequest {
         /// given since the arm came to rest, which is checked again when they begin. For a
         /// simulated arm a program may confirm; the controller cannot tell.
         confirmed_ns: Option<u64>,
+        /// Latest begin of what it is for, where later would be another motion than was planned
+        /// (CLOCK_MONOTONIC, ns).
+        begins_by_ns: Option<u64>,
     },
     /// Allow no motion any more; one that runs is braked.
     Disarm,

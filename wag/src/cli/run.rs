@@ -55,8 +55,8 @@ pub struct RunArgs {
     pub robust: usize,
     /// Strike out of the swing that a short wiggle leaves, without calming the rope: half the
     /// time. It is calmed, with a warning, where the forecast is too wide or the plan too late.
-    /// For simulated arms so far.
-    #[arg(long, conflicts_with_all = ["from", "again", "robust", "keep_films", "hold_to_run"])]
+    /// Where somebody confirms each motion, THROW is asked for before it is planned.
+    #[arg(long, conflicts_with_all = ["from", "again", "robust", "keep_films"])]
     pub fast: bool,
     /// Go on although the track of the rope is unconfirmed.
     #[arg(long)]

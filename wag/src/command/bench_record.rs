@@ -6,7 +6,7 @@
 
 use crate::cli::BenchArgs;
 use crate::config;
-use crate::pipeline::{self, BringUp, RunFolder};
+use crate::pipeline::{self, RunFolder};
 use anyhow::{Context, ensure};
 use arm_model::{JointTrajectory, Limits};
 use cli_output::{Machine, OrInput, Outcome, Stage, table, watch_interrupts};
@@ -16,6 +16,7 @@ use rig_sim::RigConfig;
 use run_log::files;
 use serde_json::{Value, json};
 use session::Session;
+use session::arm::{self, BringUp};
 use shared_types::OperatingMode;
 use shared_types::ipc::message::Percentiles;
 use shared_types::ipc::{ControllerMode, CycleRecord};
@@ -102,22 +103,22 @@ fn measure(
 ) -> anyhow::Result<([Vec<CycleRecord>; 2], u64)> {
     let (_, address) = pipeline::start_rig(session, folder, rig)?;
     let arm = pipeline::controller(session, folder, limits, &address)?;
-    pipeline::acquire(session, &arm, &mut BringUp::default())?;
+    arm::acquire(session, &arm, &mut BringUp::default())?;
     let mut cycles = [Vec::new(), Vec::new()];
     let mut file_bytes = 0;
     for block in 0..2 * pairs {
         stage.say(format!("{} of {}", block + 1, 2 * pairs));
-        pipeline::arm_for(session, &arm, OperatingMode::SetUp, None)?;
-        pipeline::move_to(session, &arm, motion.start(), MOVE_SPEED)?;
+        arm::arm_for(session, &arm, OperatingMode::SetUp, None)?;
+        arm::move_to(session, &arm, motion.start(), MOVE_SPEED)?;
         let with = matches!(block % 4, 1 | 2);
         if with {
             let camera = rig.camera.stereo_camera();
             pipeline::start_recorder(session, folder, limits, Some(&camera), rig.target_m)?;
         }
-        pipeline::arm_simulated(session, &arm, OperatingMode::Wiggle)?;
+        arm::arm_simulated(session, &arm, OperatingMode::Wiggle)?;
         session.received.drain()?;
         session.received.cycles.cycles.clear();
-        pipeline::execute(session, &arm, motion)?;
+        arm::execute(session, &arm, motion)?;
         session.received.drain()?;
         let mut seen = session.received.cycles.cycles.clone();
         seen.retain(|c| c.mode == ControllerMode::Streaming as u8);

@@ -20,7 +20,7 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
     let rig_config = rig_config.as_ref().or(args.rig_config.as_ref());
     let rig: RigConfig = config::here(rig_config.map(PathBuf::as_path)).or_input()?;
     let seed = last.as_ref().map_or(args.seed, |_| rig.seed);
-    let mut settings = config::here::<PlannerConfig>(None)
+    let settings = config::here::<PlannerConfig>(None)
         .or_input()?
         .with_identify_seed(seed);
     let limits: Limits = config::here(None).or_input()?;
@@ -29,9 +29,8 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
         (None, Some(target)) => target.0,
         (None, None) => random_target(args.task, seed),
     };
-    if args.fast {
-        settings = settings.with_short_wiggle(args.task, target_m).or_input()?;
-    }
+    let short = || settings.short_wiggle(args.task, target_m).or_input();
+    let short_wiggle = args.fast.then(short).transpose()?;
     // Refused before anything starts, whatever rope turns out to be there.
     check_target(target_m, &settings)?;
     watch_interrupts().or_failed()?;
@@ -70,7 +69,7 @@ pub fn run(args: &DemoArgs) -> Outcome<Option<Value>> {
             accept_unconfirmed: args.accept_unconfirmed,
             robust: 0,
             keeps_films: false,
-            fast: args.fast,
+            short_wiggle,
         };
         Run::start(&folder, session, record, setup, &stage)?.go(entry)
     })

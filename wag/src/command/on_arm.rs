@@ -4,11 +4,12 @@
 use super::area::{asks, operator};
 use super::runs::explain_stop;
 use crate::cli::ArmArgs;
-use crate::pipeline::{self, ArmAddress, ArmLink, BringUp, RunFolder};
+use crate::pipeline::{self, ArmAddress, RunFolder};
 use arm_model::{JointVector, Limits};
 use cli_output::{OrInput, Outcome, Stage, watch_interrupts};
 use run_log::{Cycles, files};
 use serde_json::{Value, json};
+use session::arm::{self, ArmLink, BringUp};
 use session::{Confirmation, Session, Switch};
 use shared_types::{OperatingMode, Plan};
 use std::path::{Path, PathBuf};
@@ -104,7 +105,7 @@ pub fn enable(
         // What was asked, checked and confirmed was so for that configuration.
         service.require_unchanged(session, link)?;
     }
-    pipeline::enable(session, link, acknowledges, found)?;
+    arm::enable(session, link, acknowledges, found)?;
     for warning in &found.warnings {
         tracing::warn!("{warning}");
     }
@@ -119,8 +120,8 @@ pub fn set_up_move(
     speed_fraction: f64,
 ) -> anyhow::Result<()> {
     session.await_hold()?;
-    pipeline::arm_for(session, link, OperatingMode::SetUp, None)?;
-    pipeline::move_to(session, link, pose, speed_fraction)?;
+    arm::arm_for(session, link, OperatingMode::SetUp, None)?;
+    arm::move_to(session, link, pose, speed_fraction)?;
     Ok(())
 }
 

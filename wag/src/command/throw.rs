@@ -7,7 +7,7 @@ use super::on_arm::{AT_START, on_arm};
 use super::plan_again::{LastThrow, check_thrown};
 use crate::cli::{ArmArgs, ThrowArgs};
 use crate::config;
-use crate::pipeline::{self, ArmAddress, ArmLink, RunFolder};
+use crate::pipeline::{ArmAddress, RunFolder};
 use arm_model::{ArmResponse, JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage};
 use planner::plan::warnings;
@@ -15,6 +15,7 @@ use run_log::Run;
 use run_log::files::{self, read_plan};
 use serde_json::{Value, json};
 use session::Session;
+use session::arm::{self, ArmLink};
 use shared_types::{OperatingMode, Plan};
 use std::path::Path;
 
@@ -51,10 +52,10 @@ pub fn drive(
     let work = |session: &mut Session, link: &ArmLink| {
         let confirmed_ns = session.confirm_and_hold(is_asked.then_some((AT_START, word)))?;
         let stage = Stage::begin("stream");
-        pipeline::latency(session, link)?;
-        pipeline::arm_for(session, link, operating_mode, Some(confirmed_ns))?;
-        let span = pipeline::execute(session, link, trajectory)?;
-        let latency = pipeline::latency(session, link)?;
+        arm::latency(session, link)?;
+        arm::arm_for(session, link, operating_mode, Some(confirmed_ns))?;
+        let span = arm::execute(session, link, trajectory)?;
+        let latency = arm::latency(session, link)?;
         stage.done(&format!(
             "{} cycles, {} missed, reply p99 {:.0} µs",
             latency.cycles, latency.missed, latency.reply.p99_us

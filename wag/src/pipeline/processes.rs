@@ -1,6 +1,6 @@
 //! Starting the processes of a session and connecting to them.
 
-use super::{ArmLink, RunFolder, Service};
+use super::{RunFolder, Service};
 use crate::config;
 use anyhow::bail;
 use arm_model::{ArmResponse, Limits};
@@ -9,6 +9,7 @@ use rt_controller::ControllerConfig;
 use rt_controller::arm_settings::ArmSettings;
 use rt_controller::config::OnDifference;
 use run_log::RecorderConfig;
+use session::arm::ArmLink;
 use session::{ProcessSpec, Session};
 use shared_types::ipc::message::{ControllerRequest, ControllerRpc, RigEvent, RigRequest, RigRpc};
 use shared_types::ipc::rpc::{Rpc, RpcClient};

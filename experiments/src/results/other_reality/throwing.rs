@@ -60,6 +60,9 @@ pub(super) struct Thrown {
     pub forecast: Option<ErrorForecast>,
     /// Whether the plan was pointed out as poor or uncertain.
     pub warned: bool,
+    /// Whether it began out of the swing that the wiggle left.
+    #[serde(default)]
+    pub out_of_swing: bool,
 }
 
 /// How a film was fitted.
@@ -116,6 +119,8 @@ struct Wiggled {
     reported: JointTrajectory,
     /// How the rope swung at its begin, as identified.
     sway: Sway,
+    /// Whether it was short, and a throw may begin out of its swing.
+    short: bool,
 }
 
 impl Reality<'_> {
@@ -126,13 +131,27 @@ impl Reality<'_> {
     /// # Errors
     /// MuJoCo fails. What identification or planning refuses is a fate.
     pub fn identified<const N: usize>(&self, index: u64, case: &Case) -> anyhow::Result<[Fate; N]> {
-        // The fit hears what the joints report; the arm is where it is.
-        let command = self.wiggle(case)?;
-        let reported = case.arm.reported(&command)?;
-        let filmed = self.film(case, &reported)?;
-        let found = match self.identify(index, &filmed, &reported) {
-            Ok(found) => found,
-            Err(refusal) => return Ok(array::from_fn(|_| Fate::refused(&refusal))),
+        let mut short = self.fast;
+        let (wiggled, found) = loop {
+            // The fit hears what the joints report; the arm is where it is.
+            let command = self.wiggle(case, short)?;
+            let reported = case.arm.reported(&command)?;
+            let filmed = self.film(case, &reported)?;
+            let found = match self.identify(index, &filmed, &reported) {
+                Ok(found) => found,
+                Err(refusal) => return Ok(array::from_fn(|_| Fate::refused(&refusal))),
+            };
+            if found.is_reliable() || !short {
+                let sway = found.circumstances.sway;
+                let wiggled = Wiggled {
+                    command,
+                    reported,
+                    sway,
+                    short,
+                };
+                break (wiggled, found);
+            }
+            short = false;
         };
         let (rope, posterior) = (&found.params, &found.posterior);
         let seed = self.experiment.args.seed ^ index;
@@ -149,23 +168,16 @@ impl Reality<'_> {
             out_of_distribution: found.out_of_distribution.score,
             flagged: found.out_of_distribution.is_flagged(),
         };
-        let wiggled = Wiggled {
-            command,
-            reported,
-            sway: found.circumstances.sway,
-        };
         self.thrown(index, case, (rope, ensemble), Some((fit, &wiggled)))
     }
 
     /// As `wag run` wiggles.
-    fn wiggle(&self, case: &Case) -> anyhow::Result<JointTrajectory> {
-        if !self.fast {
+    fn wiggle(&self, case: &Case, short: bool) -> anyhow::Result<JointTrajectory> {
+        if !short {
             return Ok(*self.experiment.rig.motion.trajectory());
         }
-        let config = self.experiment.config.clone();
-        let short = config
-            .with_short_wiggle(Task::Strike, case.target_m)?
-            .wiggle;
+        let config = &self.experiment.config;
+        let short = config.short_wiggle(Task::Strike, case.target_m)?;
         Ok(wiggle(&short, &Limits::default())?)
     }
 
@@ -187,7 +199,7 @@ impl Reality<'_> {
     ) -> anyhow::Result<[Fate; N]> {
         let request = self.request(index, case, rope, ensemble);
         let (fit, wiggled) = filmed.unzip();
-        let swinging = wiggled.filter(|_| self.fast);
+        let swinging = wiggled.filter(|wiggled| wiggled.short);
         let mut planned = planned(&request, swinging).context("planning");
         let mut rng = ChaCha12Rng::seed_from_u64(case.seed);
         let mut fates = Vec::with_capacity(N);
@@ -207,6 +219,7 @@ impl Reality<'_> {
                 fit,
                 forecast: plan.forecast,
                 warned: !warnings(&plan).is_empty(),
+                out_of_swing: plan.start.is_some(),
             }));
             if fates.len() == N {
                 break;

@@ -5,7 +5,7 @@ use crate::cli::LatencyArgs;
 use crate::command::area::{asks, limits, reach, require_clear_area};
 use crate::command::on_arm::{AT_START, on_arm};
 use crate::config;
-use crate::pipeline::{self, ArmAddress};
+use crate::pipeline::ArmAddress;
 use anyhow::Context;
 use arm_model::response::Excitation;
 use arm_model::{JOINTS, JointTrajectory, Limits};
@@ -13,6 +13,7 @@ use cli_output::{OrInput, Outcome, Stage};
 use planner::arm_response::excitation::sweep;
 use run_log::files;
 use serde_json::{Value, json};
+use session::arm;
 use shared_types::OperatingMode;
 use std::time::Duration;
 
@@ -90,14 +91,14 @@ pub(super) fn measure(
         |session, link| {
             if is_asked {
                 session.confirm(AT_START, "MEASURE")?;
-                pipeline::arm_for(session, link, OperatingMode::SetUp, None)?;
+                arm::arm_for(session, link, OperatingMode::SetUp, None)?;
             }
             session.await_hold()?;
             let stage = Stage::begin("sweep");
             for (place, (joint, sweep)) in sweeps.iter().enumerate() {
                 stage.say(format!("joint {joint} ({} of {})", place + 1, sweeps.len()));
                 session.idle(REST)?;
-                pipeline::execute(session, link, sweep)?;
+                arm::execute(session, link, sweep)?;
             }
             session.idle(REST)?;
             stage.done(&format!("{} joints swept", sweeps.len()));

@@ -8,7 +8,6 @@ use crate::cli::LatencyArgs;
 use crate::command::area::{asks, limits, reach_measured, require_clear_area};
 use crate::command::on_arm::{AT_START, MOVE_SPEED, on_arm};
 use crate::config;
-use crate::pipeline::{self, ArmLink, BringUp, refusal};
 use anyhow::{Context, ensure};
 use arm_model::joint::START_POSE;
 use arm_model::kinematics::tool_speed_m_s;
@@ -21,6 +20,7 @@ use rt_controller::session::ArmSession;
 use rt_controller::stopping::{StopMethod, Stopping, fastest_swing};
 use serde_json::{Value, json};
 use session::Session;
+use session::arm::{self, ArmLink, BringUp, refusal};
 use shared_types::OperatingMode;
 use shared_types::ipc::message::{ControllerEvent, ControllerRequest};
 use shared_types::plan::trajectory_hash;
@@ -154,16 +154,16 @@ pub(super) fn measure(args: &LatencyArgs) -> Outcome<Value> {
                     is_asked
                         .then(|| session.confirm(STOPPED, "MOVE"))
                         .transpose()?;
-                    pipeline::enable(session, link, true, &mut BringUp::default())?;
-                    pipeline::arm_for(session, link, SetUp, None)?;
-                    pipeline::move_to(session, link, START_POSE, MOVE_SPEED)?;
+                    arm::enable(session, link, true, &mut BringUp::default())?;
+                    arm::arm_for(session, link, SetUp, None)?;
+                    arm::move_to(session, link, START_POSE, MOVE_SPEED)?;
                 }
                 let word = is_asked
                     .then(|| session.confirm(AT_START, "MEASURE"))
                     .transpose()?;
                 session.await_hold()?;
                 let stage = Stage::begin("stop");
-                pipeline::arm_for(session, link, *mode, Some(word.unwrap_or_else(now_ns)))?;
+                arm::arm_for(session, link, *mode, Some(word.unwrap_or_else(now_ns)))?;
                 has_moved = true;
                 let stopped = stop(session, link, arm, &pole, swing, (*mode, *method))?;
                 let half = swing.state_at(0.5 * swing.duration_s());

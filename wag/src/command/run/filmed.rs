@@ -2,7 +2,6 @@
 
 use super::stages::{Run, UNNAMED_COLOURS, answered};
 use crate::command::motion;
-use crate::pipeline::{self, execute};
 use anyhow::{Context, anyhow, bail, ensure};
 use arm_model::JointTrajectory;
 use camera_ingest::process::{RATE_HZ, at_another_rate};
@@ -12,6 +11,7 @@ use planner::plan::{Shortcoming, ThrowGoal, shortcoming};
 use rt_controller::os::now_ns;
 use run_log::{Film, files, require_same_target};
 use session::Session;
+use session::arm::{self, Refused, execute};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, RigEvent, RigRequest};
 use shared_types::{MonotonicNs, OperatingMode, Plan, Task, Verdict};
 use std::time::Duration;
@@ -31,7 +31,7 @@ impl Run<'_> {
     /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
     /// finished whatever becomes of the film, of both eyes. A wiggle is made for the film's
     /// sake, of which the left eye is enough, and is braked when the process that keeps it ends.
-    /// What is to begin at an instant is not streamed, and there is no film, if that is over.
+    /// What is to begin at an instant there is no film of, if that is over or nothing moved for it.
     fn film(
         &mut self,
         frames: u32,
@@ -53,13 +53,22 @@ impl Run<'_> {
             && !(self.wait_for(begin)? && self.session.is_held())
         {
             self.session.finish(&recording, within_s, |_| ())?;
+            stage.failed("its instant was over, or the control let go");
             return Ok(None);
         }
         let stream = |session: &mut Session| execute(session, &self.arm, trajectory);
-        let motion = if throw {
-            self.session.committed(stream)?
+        let streamed = if throw {
+            self.session.committed(stream)
         } else {
-            stream(self.session)?
+            stream(self.session)
+        };
+        let motion = match streamed {
+            Err(why) if begin.is_some() && why.is::<Refused>() => {
+                self.session.finish(&recording, within_s, |_| ())?;
+                stage.failed(&format!("{why:#}"));
+                return Ok(None);
+            }
+            streamed => streamed?,
         };
         let event = self.session.finish(&recording, within_s, |event| {
             if let CameraEvent::Progress(p) = event {
@@ -117,7 +126,7 @@ impl Run<'_> {
         self.arm_for(OperatingMode::Wiggle)?;
         let stage = Stage::begin("wiggle");
         let mut frames = WIGGLE_FRAMES;
-        if self.setup.fast {
+        if self.setup.short_wiggle.is_some() {
             frames = frames.min((f64::from(RATE_HZ) * wiggle.duration_s()) as u32);
         }
         let film = self.film(frames, wiggle, (false, None), &stage)?;
@@ -212,8 +221,8 @@ impl Run<'_> {
         film.context("this throw begins at once")
     }
 
-    /// Throws with an arm that is armed for it, at an instant if one is named; no film if that is
-    /// over or the operator's control is not held then: nothing moved.
+    /// Throws with an arm that is armed for it, at an instant if one is named; no film if the
+    /// controller or the operator's control did not let it begin then: nothing moved.
     pub(super) fn throw_armed(
         &mut self,
         plan: &Plan,
@@ -221,7 +230,7 @@ impl Run<'_> {
     ) -> anyhow::Result<Option<Film>> {
         let stage = Stage::begin("throw");
         // Empties the histograms, so that they hold this throw alone.
-        pipeline::latency(self.session, &self.arm)?;
+        arm::latency(self.session, &self.arm)?;
         let frames = match self.goal().and_then(|goal| goal.rests_s()) {
             None => STRIKE_FRAMES,
             Some(rests_s) => {
@@ -230,16 +239,14 @@ impl Run<'_> {
             }
         };
         self.wait_for(begin.map_or(MonotonicNs(0), |begin| begin.plus_s(-BEFORE_THROW_S)))?;
-        let film = self.film(frames, &plan.trajectory, (true, begin), &stage)?;
-        let Some(film) = film else {
-            stage.failed("its instant is over, or the control was let go");
+        let Some(film) = self.film(frames, &plan.trajectory, (true, begin), &stage)? else {
             return Ok(None);
         };
         self.record.set_throw(film, begin);
         let started = MonotonicNs(film.motion.start_ns);
         let strikes = started.plus_s(plan.predicted_time_s);
         self.record.enabled_to_strike_s = Some(strikes.since_s(self.enabled));
-        self.record.latency = Some(pipeline::latency(self.session, &self.arm)?);
+        self.record.latency = Some(arm::latency(self.session, &self.arm)?);
         self.record.stages.throw_s = stage.done(&film.describe());
         Ok(Some(film))
     }

@@ -13,6 +13,7 @@ use camera_ingest::process::RATE_HZ;
 use cli_output::{Failure, OrInput, Outcome};
 use planner::PlannerConfig;
 use planner::plan::{check_reach, clear_of_arm};
+use planner::wiggle::WiggleConfig;
 use rig_sim::port_of_rig;
 use run_log::files::{self, read_plan};
 use run_log::{Colours, Earlier, Run as RecordedRun, confirm};
@@ -38,7 +39,7 @@ pub struct Inputs {
     pub accept_unconfirmed: bool,
     pub robust: usize,
     pub keeps_films: bool,
-    pub fast: bool,
+    pub short_wiggle: Option<WiggleConfig>,
 }
 
 /// A target that is named must lie where a rope can strike.
@@ -176,7 +177,7 @@ impl Inputs {
             robust: 0,
             resumed: None,
             keeps_films: args.keep_films,
-            fast: false,
+            short_wiggle: None,
         })
     }
 
@@ -187,7 +188,11 @@ impl Inputs {
         })
     }
 
-    pub fn of_run(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Self> {
+    pub fn of_run(
+        args: &RunArgs,
+        settings: &PlannerConfig,
+        short_wiggle: Option<WiggleConfig>,
+    ) -> Outcome<Self> {
         let named = args.target.map(|target| target.0);
         named.map_or(Ok(()), |target_m| check_target(target_m, settings))?;
         let (earlier, resumed) = earlier(args)?;
@@ -209,7 +214,7 @@ impl Inputs {
             ],
             accept_unconfirmed: args.accept_unconfirmed,
             robust: args.robust,
-            fast: args.fast,
+            short_wiggle,
             resumed,
             ..found
         })

@@ -23,7 +23,7 @@ use arm_model::{JointTrajectory, Limits};
 use cli_output::{OrInput, Outcome, Stage, is_interrupted, watch_interrupts};
 use inputs::{Inputs, entry};
 use planner::PlannerConfig;
-use planner::wiggle::wiggle;
+use planner::wiggle::{WiggleConfig, wiggle};
 use rig_sim::random_target;
 use run_log::{RunRecord, files, outcome};
 use serde_json::{Value, json};
@@ -81,26 +81,32 @@ fn settings(args: &RunArgs) -> Outcome<PlannerConfig> {
     let options = &mut settings.identify;
     options.lead_mass_kg = args.lead_mass.or(options.lead_mass_kg);
     options.length_m = args.length.or(options.length_m);
-    if args.fast {
+    Ok(settings)
+}
+
+/// The wiggle of a run that is to be fast.
+fn short_wiggle(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<WiggleConfig>> {
+    let short = || {
         let task = args.task.unwrap_or_default();
         let drawn = || random_target(task, args.seed);
         let target_m = args.target.map_or_else(drawn, |target| target.0);
-        settings = settings.with_short_wiggle(task, target_m).or_input()?;
-    }
-    Ok(settings)
+        settings.short_wiggle(task, target_m).or_input()
+    };
+    args.fast.then(short).transpose()
 }
 
 pub fn run(args: &RunArgs) -> Outcome<Option<Value>> {
     let settings = settings(args)?;
+    let short_wiggle = short_wiggle(args, &settings)?;
     if args.arm.dry_run {
-        return tell(args, &settings);
+        return tell(args, &settings, short_wiggle.as_ref());
     }
     if !args.arm.names_arm() {
         return Err(bad_input!(
             "name the arm with --arm ADDR, or a controller that runs with --controller NAME"
         ));
     }
-    let inputs = Inputs::of_run(args, &settings)?;
+    let inputs = Inputs::of_run(args, &settings, short_wiggle)?;
     let last = args.again.as_deref();
     let last = last.map(|run| LastThrow::read(run, None)).transpose()?;
     if let Some(last) = &last {
@@ -131,7 +137,11 @@ pub fn wiggle_alone(args: &WiggleArgs) -> Outcome<Option<Value>> {
 }
 
 /// Tells what would be done first, and checks it.
-fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
+fn tell(
+    args: &RunArgs,
+    settings: &PlannerConfig,
+    short_wiggle: Option<&WiggleConfig>,
+) -> Outcome<Option<Value>> {
     let target_m = args.target.map(|target| target.0);
     target_m.map_or(Ok(()), |target_m| check_target(target_m, settings))?;
     args.out
@@ -142,7 +152,9 @@ fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
     Scene::of_file(args.camera.calibration.as_deref()).or_input()?;
     let limits = limits(&args.arm, None)?;
     let first = entry(args, settings)?;
-    let Some((trajectory, operating_mode)) = first_motion(&first, &limits, settings)? else {
+    let Some((trajectory, operating_mode)) =
+        first_motion(&first, &limits, short_wiggle.unwrap_or(&settings.wiggle))?
+    else {
         println!("the throw is planned with the rope first, and checked then");
         return Ok(Some(
             json!({ "ok": true, "command": "run", "dry_run": true }),
@@ -152,8 +164,13 @@ fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
     let (name, _) = motion::words(operating_mode);
     let told = dry_run::tell(&args.arm, &limits, &trajectory, name)?;
     if matches!(first, Entry::Wiggle) {
+        let calms = if args.fast {
+            "plan a throw out of the swing and check it"
+        } else {
+            "plan the throw and check it, turn to its start by a move that damps the swing"
+        };
         println!(
-            "then it would identify the rope from the film, plan the throw and check it, turn to its start by a move that damps the swing, throw and measure by the camera; MOVE, PLACED for board or wall, and THROW are asked for, unless the arm is simulated"
+            "then it would identify the rope from the film, {calms}, throw and measure by the camera; MOVE, PLACED for board or wall, and THROW are asked for, unless the arm is simulated"
         );
     }
     Ok(Some(told))
@@ -163,12 +180,12 @@ fn tell(args: &RunArgs, settings: &PlannerConfig) -> Outcome<Option<Value>> {
 fn first_motion(
     entry: &Entry,
     limits: &Limits,
-    settings: &PlannerConfig,
+    config: &WiggleConfig,
 ) -> Outcome<Option<(JointTrajectory, OperatingMode)>> {
     Ok(match entry {
         Entry::Plan(plan) => Some((plan.trajectory, OperatingMode::Throw)),
         Entry::Wiggle | Entry::WiggleAlone => {
-            let trajectory = wiggle(&settings.wiggle, limits).or_failed()?;
+            let trajectory = wiggle(config, limits).or_failed()?;
             Some((trajectory, OperatingMode::Wiggle))
         }
         // Its throw is still to be planned.
@@ -181,9 +198,9 @@ fn check_first(
     entry: &Entry,
     address: &ArmAddress,
     limits: &Limits,
-    settings: &PlannerConfig,
+    config: &WiggleConfig,
 ) -> Outcome {
-    let Some((trajectory, operating_mode)) = first_motion(entry, limits, settings)? else {
+    let Some((trajectory, operating_mode)) = first_motion(entry, limits, config)? else {
         return Ok(());
     };
     motion::check(Some(address), limits, &trajectory, operating_mode)?;
@@ -206,16 +223,12 @@ fn on_camera(
     (out, name, seed): (Option<&Path>, &'static str, u64),
     entry: Entry,
 ) -> Outcome<Option<Value>> {
-    check_first(&entry, &address, &limits, &settings)?;
+    let first_wiggle = inputs.short_wiggle.as_ref().unwrap_or(&settings.wiggle);
+    check_first(&entry, &address, &limits, first_wiggle)?;
     if inputs.task != Task::Strike && !inputs.is_simulated() && !asks(arm, &address) {
         return Err(bad_input!(
             "before a {} somebody must put board or wall in its place, and say so: add --ask",
             inputs.task.name()
-        ));
-    }
-    if inputs.fast && asks(arm, &address) {
-        return Err(bad_input!(
-            "--fast is for simulated arms so far, without --ask: the controller cannot yet refuse a throw that begins late; leave --fast out"
         ));
     }
     let operator = operator(arm, &address)?;
@@ -272,7 +285,7 @@ fn on_camera(
             accept_unconfirmed: inputs.accept_unconfirmed,
             robust: inputs.robust,
             keeps_films: inputs.keeps_films,
-            fast: inputs.fast,
+            short_wiggle: inputs.short_wiggle,
         };
         Run::start(&folder, session, record, setup, &stage)?.go(entry)
     };

@@ -4,7 +4,6 @@
 use super::stages::{Run, SETTLED_WITHIN_S, Setup};
 use crate::command::known_rope::KnownRope;
 use crate::command::plan::describe;
-use crate::pipeline::{arm_for, execute};
 use anyhow::{Context, bail, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use cli_output::Stage;
@@ -15,6 +14,7 @@ use planner::settle::SettleRequest;
 use rt_controller::control::arming::THROW_WITHIN_NS;
 use rt_controller::os::now_ns;
 use run_log::{Film, Settled, Tracked, confirm, files};
+use session::arm::{arm_for, execute};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, RopeAppearance};
 use shared_types::rope_state::Sway;
 use shared_types::{MonotonicNs, OperatingMode, Plan, RopeParams};
@@ -34,20 +34,20 @@ const UNASKED_S: [f64; 2] = [2.0, 32.0];
 /// The same of a move that must begin soon after it was confirmed.
 const ASKED_S: [f64; 2] = [2.0, 8.0];
 /// Latest begin after it was confirmed (s), with half a second for the controller to hear of it.
-const CONFIRMED_S: f64 = THROW_WITHIN_NS as f64 * 1e-9 - 0.5;
+pub(super) const CONFIRMED_S: f64 = THROW_WITHIN_NS as f64 * 1e-9 - 0.5;
 /// How long the rope is watched for its stillness where somebody waits (s).
 const WATCHED_S: f64 = 15.0;
 /// What an operator confirms before it.
 const SETTLES: &str =
-    "The arm will move to the throw's start and damp the rope's swing, as fast as in a wiggle.";
+    "The arm will move to the next start and damp the rope's swing, as fast as in a wiggle.";
 /// Time after which the answer about a settling move is not waited for any longer (s).
 const SETTLED_S: f64 = 60.0;
 /// From the call to the first setpoint, on average (s): half a turn of the
 /// controller's bridge and half a cycle.
 const HANDOVER_S: f64 = 0.005;
 
-/// The rope, and the film and the motion after which it swings; the plan of its throw.
-type Motions<'a> = (&'a RopeParams, &'a Film, &'a JointTrajectory, &'a Plan);
+/// The rope, and the film and the motion after which it swings; where the next one starts.
+type Motions<'a> = (&'a RopeParams, &'a Film, &'a JointTrajectory, JointVector);
 
 /// What came of an attempt to settle.
 enum Attempt {
@@ -186,7 +186,11 @@ impl Run<'_> {
 
     /// Plans the throw with what was identified, of a rope that hangs still or, where what the
     /// arm did `before` is told, swings.
-    pub fn plan(&mut self, rope: &KnownRope, before: Option<ArmHistory>) -> anyhow::Result<Plan> {
+    pub(super) fn plan(
+        &mut self,
+        rope: &KnownRope,
+        before: Option<ArmHistory>,
+    ) -> anyhow::Result<Plan> {
         let stage = Stage::begin("plan");
         let options = PlanOptions {
             seed: self.record.seed,
@@ -214,6 +218,12 @@ impl Run<'_> {
         };
         plan.unconfirmed.clone_from(&rope.unconfirmed);
         self.record.stages.plan_s = stage.done(&describe(&plan));
+        Ok(plan)
+    }
+
+    /// Plans a throw of a rope at rest, keeps it, and refuses it if it must not be sent.
+    pub fn plan_from_rest(&mut self, rope: &KnownRope) -> anyhow::Result<Plan> {
+        let plan = self.plan(rope, None)?;
         self.keep_plan(&plan)?;
         self.check_throw(&plan)?;
         Ok(plan)
@@ -238,7 +248,7 @@ impl Run<'_> {
         cycles.joint_lag_s(WIGGLE_JOINT, span)
     }
 
-    /// Turns towards the target so that the rope comes to rest: by a move planned with the
+    /// Moves to where the next motion starts so that the rope comes to rest: by a move planned with the
     /// identified rope and begun at the instant it was planned for. It is planned once the
     /// operator has confirmed it, and holds the control where there is one.
     pub fn settle(&mut self, motions: Motions<'_>) -> anyhow::Result<()> {
@@ -314,7 +324,7 @@ impl Run<'_> {
     fn settle_at(
         &mut self,
         (begin, confirmed): (MonotonicNs, Option<MonotonicNs>),
-        (rope, film, wiggle, plan): Motions<'_>,
+        (rope, film, wiggle, end_q): Motions<'_>,
         stage: &Stage,
     ) -> anyhow::Result<Attempt> {
         if confirmed.is_some_and(|at| begin.since_s(at) > CONFIRMED_S) {
@@ -325,7 +335,7 @@ impl Run<'_> {
         let request = PlannerRequest::Settle(Box::new(SettleRequest {
             rope: *rope,
             before,
-            end_q: plan.trajectory.start(),
+            end_q,
             limits: self.setup.limits.clone(),
             cell: self.setup.settings.cell,
             config: self.setup.settings.settle.clone(),

@@ -4,7 +4,7 @@ use crate::command::area::response_for_plans;
 use crate::command::known_rope::KnownRope;
 use crate::command::motion;
 use crate::command::on_arm::{AT_START, enable, set_up_move};
-use crate::pipeline::{self, ArmAddress, ArmLink, BringUp, FramesFrom, RunFolder};
+use crate::pipeline::{self, ArmAddress, FramesFrom, RunFolder};
 use anyhow::{Context, anyhow, bail};
 use arm_model::{JointTrajectory, Limits};
 use camera_ingest::calib::keep_calibration;
@@ -12,14 +12,18 @@ use cli_output::{Stage, output};
 use planner::PlannerConfig;
 use planner::arm_response::Following;
 use planner::service::{PlannerRequest, PlannerRpc};
-use planner::wiggle::wiggle;
+use planner::wiggle::{WiggleConfig, wiggle};
 use rt_controller::os::now_ns;
 use rt_controller::point_to_point::fraction_that_lasts;
 use run_log::{Film, RunRecord, files};
 use session::Session;
+use session::arm::{self, ArmLink, BringUp};
 use shared_types::ipc::message::{CameraEvent, CameraRequest, CameraRpc, RigRpc, RopeAppearance};
 use shared_types::ipc::rpc::RpcClient;
-use shared_types::{MonotonicNs, OperatingMode, Plan, StereoCamera, Task};
+use shared_types::{
+    MonotonicNs, OperatingMode, Plan, RopeEstimate, RopeParams, StereoCamera, Task,
+};
+use std::time::{Duration, Instant};
 
 /// Speed of moves between poses, as a part of the fastest move.
 ///
@@ -33,6 +37,8 @@ const FAST_MOVE_S: f64 = 3.5;
 pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 /// The same after any other move, where the swing of whatever was before decays by itself (s).
 const DECAYED_WITHIN_S: f64 = 180.0;
+/// Oldest confirmation of a move at set-up speed.
+const CONFIRMED_WITHIN: Duration = Duration::from_secs(10);
 /// What to do where the colours to look for are not known.
 pub const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
 /// How often the camera is asked for frames before the arm is enabled.
@@ -68,8 +74,8 @@ pub struct Setup {
     pub robust: usize,
     /// Whether the films are kept whole, both images.
     pub keeps_films: bool,
-    /// Whether to throw out of the swing that the wiggle leaves.
-    pub fast: bool,
+    /// The wiggle of a run that is to be fast: the throw is made out of the swing that it leaves.
+    pub short_wiggle: Option<WiggleConfig>,
 }
 
 /// The running processes and what all stages need.
@@ -176,7 +182,7 @@ impl<'a> Run<'a> {
             }
             Entry::Rope(rope) => {
                 self.keep_rope(&rope)?;
-                let plan = self.plan(&rope, None)?;
+                let plan = self.plan_from_rest(&rope)?;
                 // What was confirmed before may be minutes old.
                 let what = "The arm will be enabled and move to the throw's start.";
                 let asked = self.setup.asks.then(|| self.session.confirm(what, "MOVE"));
@@ -185,13 +191,22 @@ impl<'a> Run<'a> {
                 (plan, None)
             }
             Entry::Wiggle => {
-                let (motion, film, appearance) = self.tracked()?;
-                let rope = self.identify(&film, appearance)?;
+                let (mut motion, mut film, appearance) = self.tracked()?;
+                let told = self.record.warnings.len();
+                let mut rope = self.identify(&film, appearance)?;
+                let fits = rope.estimate().is_none_or(RopeEstimate::is_reliable);
+                if self.setup.short_wiggle.is_some() && !fits {
+                    self.record.warnings.truncate(told);
+                    let appearance;
+                    (motion, film, appearance) =
+                        self.tracked_at_length((&rope.params, &film, &motion))?;
+                    rope = self.identify(&film, appearance)?;
+                }
                 if let Some((plan, throw)) = self.throw_out_of_swing(&rope, &film, &motion)? {
                     (plan, Some(throw))
                 } else {
-                    let plan = self.plan(&rope, None)?;
-                    self.settle((&rope.params, &film, &motion, &plan))?;
+                    let plan = self.plan_from_rest(&rope)?;
+                    self.settle((&rope.params, &film, &motion, plan.trajectory.start()))?;
                     (plan, None)
                 }
             }
@@ -210,8 +225,34 @@ impl<'a> Run<'a> {
 
     /// Wiggles, films and tracks: motion, film, sizes of rope and lead.
     fn tracked(&mut self) -> anyhow::Result<(JointTrajectory, Film, RopeAppearance)> {
-        let motion = wiggle(&self.setup.settings.wiggle, &self.setup.limits)?;
+        let Setup {
+            settings, limits, ..
+        } = &self.setup;
+        let config = self.setup.short_wiggle.as_ref().unwrap_or(&settings.wiggle);
+        let motion = wiggle(config, limits)?;
         self.bring_up(&motion)?;
+        self.tracked_from_start(motion)
+    }
+
+    /// The same with the usual wiggle, after a `short` one that did not tell the `rope` well, but
+    /// well enough to damp its swing.
+    fn tracked_at_length(
+        &mut self,
+        (rope, film, short): (&RopeParams, &Film, &JointTrajectory),
+    ) -> anyhow::Result<(JointTrajectory, Film, RopeAppearance)> {
+        self.warn("wiggled again, at length, and calmed before the throw: no rope explains the film of the short wiggle well");
+        self.setup.short_wiggle = None;
+        let motion = wiggle(&self.setup.settings.wiggle, &self.setup.limits)?;
+        self.check_motion(&motion, OperatingMode::Wiggle)?;
+        // What swing is left, because the rope is another one, the fit finds at the first frame.
+        self.settle((rope, film, short, motion.start()))?;
+        self.tracked_from_start(motion)
+    }
+
+    fn tracked_from_start(
+        &mut self,
+        motion: JointTrajectory,
+    ) -> anyhow::Result<(JointTrajectory, Film, RopeAppearance)> {
         let film = self.wiggle(&motion)?;
         let appearance = self.track(&film)?;
         Ok((motion, film, appearance))
@@ -255,15 +296,19 @@ impl<'a> Run<'a> {
         let word = motion::words(operating_mode).1;
         let asked = self.setup.asks.then_some((AT_START, word));
         let confirmed_ns = self.session.confirm_and_hold(asked)?;
-        pipeline::arm_for(self.session, &self.arm, operating_mode, Some(confirmed_ns))
+        arm::arm_for(self.session, &self.arm, operating_mode, Some(confirmed_ns))
     }
 
     /// Enables the arm, moves to the start pose, waits for the rope.
     fn bring_up(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
-        let stage = Stage::begin("bring-up");
-        if self.setup.fast {
-            self.wait_or_warn(&stage)?;
+        if self.setup.short_wiggle.is_some() {
+            let took = self.await_stillness()?;
+            if self.setup.asks && took > CONFIRMED_WITHIN {
+                let what = "The arm will be enabled and move to the wiggle's start.";
+                self.session.confirm(what, "MOVE")?;
+            }
         }
+        let stage = Stage::begin("bring-up");
         let mut found = BringUp::default();
         let of = (&self.setup.address, self.setup.acknowledges);
         let enabled = enable(self.session, &self.arm, of, &mut found);
@@ -272,7 +317,7 @@ impl<'a> Run<'a> {
         enabled?;
         self.enabled = MonotonicNs(now_ns());
         self.move_to_start(motion)?;
-        if !self.setup.fast {
+        if !self.setup.short_wiggle.is_some() {
             self.wait_or_warn(&stage)?;
         }
         let confirmation = if self.setup.address.simulated && !self.setup.asks {
@@ -285,11 +330,20 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// Waits for the rope; how long that took.
+    fn await_stillness(&mut self) -> anyhow::Result<Duration> {
+        let began = Instant::now();
+        let stage = Stage::begin("stillness");
+        let is_still = self.wait_or_warn(&stage)?;
+        stage.done(["the rope still swings", "the rope hangs still"][usize::from(is_still)]);
+        Ok(began.elapsed())
+    }
+
     /// Moves to the start of `motion` at set-up speed. Where the run is to be fast the rope hung
     /// still before, and the move leaves it so.
     fn move_to_start(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
         let mut speed = MOVE_SPEED;
-        if self.setup.fast {
+        if self.setup.short_wiggle.is_some() {
             self.session.received.drain()?;
             let now = self.session.received.cycles.joints_between(0, u64::MAX);
             let (_, from) = now.last().context("the arm does not report its joints")?;
@@ -298,14 +352,15 @@ impl<'a> Run<'a> {
         set_up_move(self.session, &self.arm, motion.start(), speed)
     }
 
-    /// Waits until the rope hangs still, or its swing has had time to decay.
-    pub(super) fn wait_or_warn(&mut self, stage: &Stage) -> anyhow::Result<()> {
-        if !self.wait_still(stage, DECAYED_WITHIN_S)? {
+    /// Waits until the rope hangs still, or its swing has had time to decay; whether it does.
+    pub(super) fn wait_or_warn(&mut self, stage: &Stage) -> anyhow::Result<bool> {
+        let is_still = self.wait_still(stage, DECAYED_WITHIN_S)?;
+        if !is_still {
             self.warn(&format!(
                 "the rope still swings after {DECAYED_WITHIN_S} s, and what follows takes it to hang still"
             ));
         }
-        Ok(())
+        Ok(is_still)
     }
 }
 

@@ -1,30 +1,43 @@
 //! Asking the controller: bring-up, moves, trajectories, latencies.
 
+use crate::Session;
 use anyhow::{anyhow, ensure};
 use arm_model::{JointTrajectory, JointVector};
 use rt_controller::os::now_ns;
 use run_log::MotionSpan;
 use serde_json::{Value, json};
-use session::Session;
-use shared_types::OperatingMode;
 use shared_types::ipc::ControllerMode;
 use shared_types::ipc::message::{
     ControllerEvent, ControllerRequest, ControllerRpc, LatencyReport,
 };
 use shared_types::ipc::rpc::RpcClient;
 use shared_types::plan::trajectory_hash;
+use shared_types::{FaultCode, MonotonicNs, OperatingMode};
 
 /// Longest move to a start pose: at set-up speed a far one takes its time.
 const MOVED_WITHIN_S: f64 = 600.0;
 
+/// The controller, to be asked.
 pub type ArmLink = RpcClient<ControllerRpc>;
 
-/// The error of an event that ends a request badly.
+/// What the controller did not begin.
+#[derive(Debug, thiserror::Error)]
+#[error("the controller refused {what} ({fault:?}): {message}")]
+pub struct Refused {
+    what: String,
+    /// Why.
+    pub fault: FaultCode,
+    message: String,
+}
+
+/// The error of an event that ends a request badly; a [`Refused`] where nothing moved for it.
 pub fn refusal(what: &str, event: &ControllerEvent) -> anyhow::Error {
     match event {
-        ControllerEvent::Refused { fault, message } => {
-            anyhow!("the controller refused {what} ({fault:?}): {message}")
-        }
+        ControllerEvent::Refused { fault, message } => anyhow::Error::new(Refused {
+            what: what.to_owned(),
+            fault: *fault,
+            message: message.clone(),
+        }),
         ControllerEvent::Stopped {
             fault,
             cycle,
@@ -97,7 +110,7 @@ pub fn enable(
             fault,
             ..
         } => {
-            ensure!(acknowledges, session::has_stopped(fault));
+            ensure!(acknowledges, crate::has_stopped(fault));
             ControllerRequest::Acknowledge
         }
         _ => ControllerRequest::Bringup,
@@ -126,9 +139,20 @@ pub fn arm_for(
     operating_mode: OperatingMode,
     confirmed_ns: Option<u64>,
 ) -> anyhow::Result<()> {
+    arm_until(session, arm, operating_mode, (confirmed_ns, None))
+}
+
+/// The same for a motion that begins by an instant or not at all.
+pub fn arm_until(
+    session: &mut Session,
+    arm: &ArmLink,
+    operating_mode: OperatingMode,
+    (confirmed_ns, begins_by): (Option<u64>, Option<MonotonicNs>),
+) -> anyhow::Result<()> {
     let request = ControllerRequest::Arm {
         operating_mode,
         confirmed_ns,
+        begins_by_ns: begins_by.map(|by| by.0),
     };
     let event = session.ask(arm, &request, 5.0, |_| ())?;
     ensure!(event == ControllerEvent::Done, refusal("to arm", &event));
