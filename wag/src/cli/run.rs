@@ -55,7 +55,8 @@ pub struct RunArgs {
     pub robust: usize,
     /// Strike out of the swing that a short wiggle leaves, without calming the rope: half the
     /// time. It is calmed, with a warning, where the forecast is too wide or the plan too late.
-    /// Where somebody confirms each motion, THROW is asked for before it is planned.
+    /// Wiggled again at length where no rope explains the short film. Where somebody confirms each
+    /// motion, THROW is asked for before the plan is made.
     #[arg(long, conflicts_with_all = ["from", "again", "robust", "keep_films"])]
     pub fast: bool,
     /// Go on although the track of the rope is unconfirmed.

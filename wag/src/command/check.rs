@@ -128,6 +128,9 @@ pub fn run(args: &CheckArgs) -> Outcome<Option<Value>> {
             "warning: pole or wrist come within 5 mm of arm, column or floor at {contact_s:.3} s"
         ));
     }
+    if let Err(swung) = plan.require_at_rest() {
+        output::remark(format_args!("warning: {swung}"));
+    }
     print_tightest(&margins);
     Ok(Some(json!({
         "ok": true, "command": "check", "interface": arm.interface, "margins": margins, "arm": judged,

@@ -89,56 +89,6 @@ fn a_rope_is_wiggled_identified_and_thrown_with_an_arm_and_a_camera_that_are_the
     assert_ne!(plan("d"), plan("run"));
 }
 
-/// Wiggled where the throw starts, not calmed, thrown when the swing has come to where it was
-/// planned for; no other throw begins so.
-#[test]
-fn a_strike_out_of_the_swing_is_thrown_at_its_instant_and_at_no_other() {
-    let _turn = alone();
-    let domain = format!("fast{}", std::process::id());
-    let rig = Rig::start(&format!("--rope random --seed 4 --camera {domain}"));
-    let folder = tempfile::tempdir().unwrap();
-    let here = folder.path();
-    let [port, joints, _, rich, _] = rig.ports();
-    let arm = format!(
-        "--arm 127.0.0.1 --command-port {port} --report-port {joints} --status-port {rich} --camera {domain}"
-    );
-    let done = moved_in(here, &format!("run --fast {arm} --seed 4"), "fast");
-    assert_eq!(
-        (&done["settle"], &done["warnings"]),
-        (&Value::Null, &json!([]))
-    );
-    let missed_m = done["true_tip_target_distance_m"].as_f64().unwrap();
-    assert!(missed_m < 0.02, "{missed_m} m");
-    assert!(
-        done["throw_late_s"].as_f64().unwrap().abs() < 0.02,
-        "{done}"
-    );
-    assert_eq!(done["wiggle"]["frames"], 204);
-    let plan = files::read_plan(&here.join("fast/plan.json")).unwrap();
-    let state = plan.start.as_ref().unwrap();
-    assert_eq!(state.check(plan.rope.links), Ok(()));
-    assert!(here.join("fast/report.html").exists());
-    let asked = refused_in(here, 2, &format!("run --fast {arm} --ask --out other"));
-    assert!(asked.contains("simulated arms so far"), "{asked}");
-    for again in ["--again fast", "--from throw fast"] {
-        let refused = refused_in(here, 2, &format!("run {again} {arm} --out other"));
-        assert!(refused.contains("still swung"), "{refused}");
-    }
-    let line = format!(
-        "throw fast/plan.json {}",
-        arm.replace(&format!(" --camera {domain}"), "")
-    );
-    let refused = refused_in(here, 2, &line);
-    assert!(refused.contains("still swung"), "{refused}");
-    // Its rope is known now, and struck with from rest.
-    let calm = moved_in(here, &format!("run --from plan fast {arm}"), "calm");
-    assert!(
-        calm["true_tip_target_distance_m"].as_f64().unwrap() < 0.02,
-        "{calm}"
-    );
-    assert_eq!(calm["throw_late_s"], Value::Null);
-}
-
 /// The rig puts board and domino up; what the tip does to them is judged by camera and truth alike.
 #[test]
 fn a_lob_is_thrown_with_an_arm_and_a_camera_that_are_there_and_judged_as_it_is() {

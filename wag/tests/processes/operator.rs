@@ -1,7 +1,7 @@
 //! What the operator at the terminal can do: Ctrl-C, and stops by standard input.
 
 use super::shell::{arm, on_arm, recorded};
-use crate::support::{beside_others, ended, has, refused_in, send, until};
+use crate::support::{beside_others, ended, has, heard, refused_in, send, until};
 use arm_model::response::{Estimate, JointResponse, TrackingLag};
 use arm_model::{ArmResponse, JOINTS};
 use rustix::process::Signal;
@@ -85,13 +85,7 @@ fn a_dead_man_switch_that_is_not_held_moves_nothing() {
 
 /// Reads what a child says to people up to `words`.
 fn read_until(child: &mut Child, words: &str) {
-    let stderr = child.stderr.as_mut().unwrap();
-    let (mut text, mut byte) = (Vec::new(), [0]);
-    while !text.ends_with(words.as_bytes()) {
-        let n = stderr.read(&mut byte).unwrap();
-        assert_eq!(n, 1, "{}", String::from_utf8_lossy(&text));
-        text.extend(byte);
-    }
+    heard(child, words).unwrap();
 }
 
 /// A wiggle that asks as a real arm's does, answered by `word` in the start pose; what it said

@@ -70,6 +70,19 @@ pub(crate) fn ended(child: Child, code: i32) -> String {
     said
 }
 
+/// What a child says to people up to some words and these; all there is where they never come.
+pub(crate) fn heard(child: &mut Child, words: &str) -> Result<String, String> {
+    let stderr = child.stderr.as_mut().unwrap();
+    let (mut text, mut byte) = (Vec::new(), [0]);
+    while !text.ends_with(words.as_bytes()) {
+        if stderr.read(&mut byte).unwrap() == 0 {
+            return Err(String::from_utf8_lossy(&text).into_owned());
+        }
+        text.extend(byte);
+    }
+    Ok(String::from_utf8_lossy(&text).into_owned())
+}
+
 /// All of these words must be in a text.
 #[track_caller]
 pub(crate) fn has(text: &str, words: &[&str]) {
