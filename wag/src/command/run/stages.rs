@@ -317,7 +317,7 @@ impl<'a> Run<'a> {
         enabled?;
         self.enabled = MonotonicNs(now_ns());
         self.move_to_start(motion)?;
-        if !self.setup.short_wiggle.is_some() {
+        if self.setup.short_wiggle.is_none() {
             self.wait_or_warn(&stage)?;
         }
         let confirmation = if self.setup.address.simulated && !self.setup.asks {
