@@ -59,7 +59,7 @@ pub use mcap_file::{
 pub use page::show;
 pub use run::{CellHere, NoRecording, Recording, Run};
 pub use run_outcome::{loop_table, outcome, parameter_table};
-pub use run_record::{Film, MotionSpan, RunRecord, Settled, StageTimes, Tracked};
+pub use run_record::{Film, LATE_MAX_S, MotionSpan, RunRecord, Settled, StageTimes, Tracked};
 pub use run_score::{Colours, Kept, NamedFilm, ScoredBy, UNNAMED_COLOURS, require_same_target};
 pub use tracked_film::TrackedFilm;
 pub use unconfirmed::confirm;

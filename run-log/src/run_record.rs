@@ -17,8 +17,8 @@ pub struct MotionSpan {
     pub end_ns: u64,
 }
 
-/// Latest begin of a throw out of a swing that is as good as planned (s).
-const LATE_MAX_S: f64 = 0.02;
+/// Latest begin of a throw out of a swing after its instant that is as good as planned (s).
+pub const LATE_MAX_S: f64 = 0.02;
 
 /// Wall time of each stage (s).
 #[derive(Debug, Clone, Default, Serialize)]
@@ -71,7 +71,6 @@ pub struct Film {
     /// Frames the camera dropped.
     pub dropped: u32,
     /// When the motion ran.
-    #[serde(skip)]
     pub motion: MotionSpan,
 }
 

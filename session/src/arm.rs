@@ -30,6 +30,15 @@ pub struct Refused {
     message: String,
 }
 
+impl Refused {
+    /// Whether an error is one of a motion that would have begun too late.
+    #[must_use]
+    pub fn is_late(error: &anyhow::Error) -> bool {
+        let refused = error.downcast_ref::<Self>();
+        refused.is_some_and(|refused| refused.fault == FaultCode::ArmingExpired)
+    }
+}
+
 /// The error of an event that ends a request badly; a [`Refused`] where nothing moved for it.
 pub fn refusal(what: &str, event: &ControllerEvent) -> anyhow::Error {
     match event {
@@ -139,22 +148,41 @@ pub fn arm_for(
     operating_mode: OperatingMode,
     confirmed_ns: Option<u64>,
 ) -> anyhow::Result<()> {
-    arm_until(session, arm, operating_mode, (confirmed_ns, None))
+    arm_with(
+        session,
+        arm,
+        &ControllerRequest::Arm {
+            operating_mode,
+            confirmed_ns,
+            begins_by_ns: None,
+        },
+    )
 }
 
-/// The same for a motion that begins by an instant or not at all.
-pub fn arm_until(
+/// Arms for a throw that begins by an instant or not at all.
+pub fn arm_to_throw_by(
     session: &mut Session,
     arm: &ArmLink,
-    operating_mode: OperatingMode,
-    (confirmed_ns, begins_by): (Option<u64>, Option<MonotonicNs>),
+    confirmed_ns: u64,
+    begins_by: MonotonicNs,
 ) -> anyhow::Result<()> {
-    let request = ControllerRequest::Arm {
-        operating_mode,
-        confirmed_ns,
-        begins_by_ns: begins_by.map(|by| by.0),
-    };
-    let event = session.ask(arm, &request, 5.0, |_| ())?;
+    arm_with(
+        session,
+        arm,
+        &ControllerRequest::Arm {
+            operating_mode: OperatingMode::Throw,
+            confirmed_ns: Some(confirmed_ns),
+            begins_by_ns: Some(begins_by.0),
+        },
+    )
+}
+
+fn arm_with(
+    session: &mut Session,
+    arm: &ArmLink,
+    request: &ControllerRequest,
+) -> anyhow::Result<()> {
+    let event = session.ask(arm, request, 5.0, |_| ())?;
     ensure!(event == ControllerEvent::Done, refusal("to arm", &event));
     Ok(())
 }

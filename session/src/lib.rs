@@ -2,8 +2,8 @@
 //! ended together, the operator at standard input, what comes over shared memory meanwhile,
 //! and the file of the run.
 //!
-//! A [`Session`] knows none of the processes by name: what is started and asked is its user's;
-//! only what every such command asks of the controller is in [`arm`].
+//! A [`Session`] knows none of the processes by name: what is started and asked is its user's.
+//! What all such commands ask of the controller is in [`arm`].
 
 // Its macros stand for the standard ones everywhere below.
 #[macro_use]

@@ -96,7 +96,7 @@ fault_codes! {
     OperatingModeExceeded = 45:
         "the motion is faster than its operating mode allows; slow it down or arm for a faster one";
     ArmingExpired = 46:
-        "the arming ran out before the motion began; look whether the area is still clear and arm again";
+        "the arming ran out, or the instant by which the motion had to begin was over, before it began; look whether the area is still clear and arm again";
     UploadTimedOut = 47:
         "the upload of the plan did not end in time; see whether the planner still runs and send it again";
     SecondCommander = 50:

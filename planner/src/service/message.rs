@@ -62,6 +62,11 @@ pub enum PlannerEvent {
     },
 }
 
+/// What the planner could not do, as it said.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Declined(pub String);
+
 /// The planner's service.
 #[derive(Debug)]
 pub struct PlannerRpc;

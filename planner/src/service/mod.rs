@@ -9,7 +9,7 @@
 mod collect;
 mod message;
 
-pub use message::{IdentifyRequest, PlannerEvent, PlannerRequest, PlannerRpc};
+pub use message::{Declined, IdentifyRequest, PlannerEvent, PlannerRequest, PlannerRpc};
 
 use crate::config::PlannerConfig;
 use crate::observation::{Observation, ObservedPoints};

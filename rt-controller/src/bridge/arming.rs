@@ -48,6 +48,7 @@ impl Bridge {
             Err(why) => return refuse(&call, FaultCode::NotArmed, &why),
         };
         self.confirmed_ns = confirmed_ns;
+        self.begins_by_ns = begins_by_ns;
         let arming = Arming {
             operating_mode,
             // The loop itself refuses what begins later, in whatever cycle it would.

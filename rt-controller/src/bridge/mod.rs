@@ -99,6 +99,8 @@ pub struct Bridge {
     at_rest_ns: u64,
     /// When the area was confirmed clear for what is armed (CLOCK_MONOTONIC, ns).
     confirmed_ns: Option<u64>,
+    /// By when what is armed must begin (CLOCK_MONOTONIC, ns).
+    begins_by_ns: Option<u64>,
     last_id: u64,
     /// Asks the arm to stop until it says that it has.
     stopping: Option<JoinHandle<()>>,
@@ -147,6 +149,7 @@ impl Bridge {
             armed: Err(FaultCode::NotArmed),
             at_rest_ns: 0,
             confirmed_ns: None,
+            begins_by_ns: None,
             last_id: 0,
             stopping: None,
         })
@@ -304,6 +307,14 @@ impl Bridge {
                     (Awaited::Motion { id, .. }, Some(refused)) => *id == refused,
                     (Awaited::Armed | Awaited::Engaged { .. }, None) => true,
                     _ => false,
+                };
+                // The loop has told that the arming ran out, and disarmed, before.
+                let expired =
+                    fault == FaultCode::NotArmed && self.armed == Err(FaultCode::ArmingExpired);
+                let fault = if expired {
+                    FaultCode::ArmingExpired
+                } else {
+                    fault
                 };
                 for open in self.take(refused) {
                     refuse(&open.call, fault, "");

@@ -279,6 +279,10 @@ impl Bridge {
             return Err((FaultCode::StartPoseMismatch, detail));
         }
         let mut motions = VecDeque::new();
+        if off_rad > START_EQUAL_RAD && self.begins_by_ns.is_some() {
+            let detail = "the arm does not stand at the start of the plan, and a move there would make it late; move it there before it is armed";
+            return Err((FaultCode::StartPoseMismatch, detail.to_owned()));
+        }
         if off_rad > START_EQUAL_RAD {
             let to_start = plan_move(
                 &held,

@@ -136,8 +136,7 @@ impl Session {
             self.await_hold()?;
             let since_s = MonotonicNs(now_ns()).since_s(MonotonicNs(confirmed_ns));
             // What is let go the controller refuses, in its own words.
-            let is_let_go = self.presence.as_mut().is_some_and(Presence::is_let_go);
-            if since_s < BEGINS_WITHIN_S || is_let_go {
+            if since_s < BEGINS_WITHIN_S || self.is_let_go() {
                 return Ok(confirmed_ns);
             }
             self.end_hold();
@@ -161,6 +160,11 @@ impl Session {
     /// Whether a motion may begin at this instant, as far as the operator's control lets it.
     pub fn is_held(&mut self) -> bool {
         self.presence.as_mut().is_none_or(Presence::is_held)
+    }
+
+    /// Whether the operator has let the arm go for good: nothing moves in this session any more.
+    pub fn is_let_go(&mut self) -> bool {
+        self.presence.as_mut().is_some_and(Presence::is_let_go)
     }
 
     /// The motion is over: what was held may be released.

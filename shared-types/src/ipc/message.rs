@@ -213,7 +213,7 @@ pub enum ControllerEvent {
 pub struct ControllerRpc;
 
 impl Rpc for ControllerRpc {
-    const NAME: &'static str = "wag/v3/controller/control";
+    const NAME: &'static str = "wag/v4/controller/control";
     type Request = ControllerRequest;
     type Event = ControllerEvent;
     fn is_last(event: &ControllerEvent) -> bool {

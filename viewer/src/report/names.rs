@@ -28,9 +28,17 @@ pub(crate) fn names(
         Some(wiggle_s) => wiggle_s > 0.0,
         None => has_rope || command == Some("wiggle"),
     };
+    let span = &summary["wiggle"]["motion"];
+    let filmed_s = span["end_ns"].as_u64().zip(span["start_ns"].as_u64());
+    let filmed_s = filmed_s.map(|(end, start)| end.saturating_sub(start) as f64 * 1e-9);
+    let filmed = |s: &f64| filmed_s.is_some_and(|f| (f - s).abs() < SAME_DURATION_S);
+    let before_throw = &durations_s[..throw.unwrap_or(durations_s.len())];
+    let wiggle = before_throw.iter().rposition(filmed).unwrap_or(0);
     let kind = |index: usize| match throw {
         Some(throw) if index == throw => Some("throw"),
-        _ if index == 0 && wiggled => Some("wiggle"),
+        _ if index == wiggle && wiggled => Some("wiggle"),
+        // What its film told was not relied on.
+        _ if index == 0 && wiggled => Some("short wiggle"),
         Some(throw) if index < throw => Some("settle"),
         _ => None,
     };
@@ -62,6 +70,13 @@ mod tests {
         assert_eq!(found, ["wiggle", "settle", "throw"]);
         let found = named(&[6.7, 3.5, 3.4, 1.15], Some(1.15), &run);
         assert_eq!(found, ["wiggle", "settle 1", "settle 2", "throw"]);
+        let again = json!({
+            "stages": { "wiggle_s": 10.1 },
+            "wiggle": { "motion": { "start_ns": 8_000_000_000_u64, "end_ns": 14_700_000_000_u64 } },
+        });
+        let found = named(&[3.4, 3.5, 6.7, 3.5, 1.15], Some(1.15), &again);
+        let known = ["short wiggle", "settle 1", "wiggle", "settle 2", "throw"];
+        assert_eq!(found, known);
         // Nothing was thrown: what came after the wiggle is not known.
         assert_eq!(named(&[6.7, 3.5], Some(1.15), &run), ["wiggle", "motion 2"]);
     }

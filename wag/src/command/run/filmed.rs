@@ -31,7 +31,7 @@ impl Run<'_> {
     /// Records frames; as soon as the first is kept, streams `trajectory`. A throw is
     /// finished whatever becomes of the film, of both eyes. A wiggle is made for the film's
     /// sake, of which the left eye is enough, and is braked when the process that keeps it ends.
-    /// What is to begin at an instant there is no film of, if that is over or nothing moved for it.
+    /// Of what is to begin at an instant there is no film if that is over: nothing moved for it.
     fn film(
         &mut self,
         frames: u32,
@@ -63,7 +63,7 @@ impl Run<'_> {
             stream(self.session)
         };
         let motion = match streamed {
-            Err(why) if begin.is_some() && why.is::<Refused>() => {
+            Err(why) if begin.is_some() && Refused::is_late(&why) => {
                 self.session.finish(&recording, within_s, |_| ())?;
                 stage.failed(&format!("{why:#}"));
                 return Ok(None);
@@ -132,7 +132,7 @@ impl Run<'_> {
         let film = self.film(frames, wiggle, (false, None), &stage)?;
         let film = film.context("a wiggle begins at once")?;
         self.record.set_wiggle(film);
-        self.record.stages.wiggle_s = stage.done(&film.describe());
+        self.record.stages.wiggle_s += stage.done(&film.describe());
         self.keep_film(files::WIGGLE_FILM)?;
         Ok(film)
     }
@@ -151,10 +151,9 @@ impl Run<'_> {
             .map_err(|why| anyhow!("{why}"))
     }
 
-    /// Refuses a throw that must not be sent, or that would not do what it is for: one planned for
-    /// an arm that follows otherwise, or that is predicted to miss; on a simulated arm both are
-    /// allowed.
-    pub fn check_throw(&self, plan: &Plan) -> anyhow::Result<()> {
+    /// Refuses a throw that would break a limit, or was planned for an arm that follows otherwise;
+    /// on a simulated arm that is allowed.
+    pub fn check_for_arm(&self, plan: &Plan) -> anyhow::Result<()> {
         self.check_motion(&plan.trajectory, OperatingMode::Throw)?;
         let address = &self.setup.address;
         let follows = self.following.as_ref().map(Following::source);
@@ -166,6 +165,13 @@ impl Run<'_> {
                 named(follows)
             );
         }
+        Ok(())
+    }
+
+    /// Refuses such a throw, and one that is predicted to miss, which a simulated arm may make.
+    pub fn check_throw(&self, plan: &Plan) -> anyhow::Result<()> {
+        self.check_for_arm(plan)?;
+        let address = &self.setup.address;
         match shortcoming(plan) {
             Some(Shortcoming { message, is_severe }) if is_severe && !address.simulated => {
                 let plan = self.folder.file(files::PLAN);

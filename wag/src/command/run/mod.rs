@@ -165,7 +165,7 @@ fn tell(
     let told = dry_run::tell(&args.arm, &limits, &trajectory, name)?;
     if matches!(first, Entry::Wiggle) {
         let calms = if args.fast {
-            "plan a throw out of the swing and check it"
+            "plan a throw out of the swing and check it (or damp the swing, and wiggle again, where that promises too little)"
         } else {
             "plan the throw and check it, turn to its start by a move that damps the swing"
         };
@@ -223,8 +223,11 @@ fn on_camera(
     (out, name, seed): (Option<&Path>, &'static str, u64),
     entry: Entry,
 ) -> Outcome<Option<Value>> {
-    let first_wiggle = inputs.short_wiggle.as_ref().unwrap_or(&settings.wiggle);
-    check_first(&entry, &address, &limits, first_wiggle)?;
+    // A short one may be followed by the usual one.
+    for config in [Some(&settings.wiggle), inputs.short_wiggle.as_ref()] {
+        let checks = |config| check_first(&entry, &address, &limits, config);
+        config.map_or(Ok(()), checks)?;
+    }
     if inputs.task != Task::Strike && !inputs.is_simulated() && !asks(arm, &address) {
         return Err(bad_input!(
             "before a {} somebody must put board or wall in its place, and say so: add --ask",

@@ -9,7 +9,7 @@ use arm_model::{JointTrajectory, JointVector};
 use cli_output::Stage;
 use planner::history::ArmHistory;
 use planner::plan::{PlanOptions, PlanRequest, warnings};
-use planner::service::{IdentifyRequest, PlannerEvent, PlannerRequest};
+use planner::service::{Declined, IdentifyRequest, PlannerEvent, PlannerRequest};
 use planner::settle::SettleRequest;
 use rt_controller::control::arming::THROW_WITHIN_NS;
 use rt_controller::os::now_ns;
@@ -74,7 +74,7 @@ impl Run<'_> {
                 }
             })?;
         match event {
-            PlannerEvent::Failed { message } => bail!(message),
+            PlannerEvent::Failed { message } => Err(Declined(message).into()),
             event => Ok(event),
         }
     }
@@ -123,7 +123,7 @@ impl Run<'_> {
             },
             other => bail!("the camera process answered with {other:?}"),
         };
-        self.record.stages.track_s = stage.done(&format!(
+        self.record.stages.track_s += stage.done(&format!(
             "{:.1} ms a frame, rope lost in {:.1} %",
             tracked.ms_per_frame,
             100.0 * tracked.lost_fraction
@@ -162,7 +162,7 @@ impl Run<'_> {
         };
         let tracked = self.record.track.as_ref();
         let unconfirmed = tracked.map_or_else(Vec::new, |tracked| tracked.unconfirmed.clone());
-        self.record.stages.identify_s = stage.done(&format!(
+        self.record.stages.identify_s += stage.done(&format!(
             "length {:.3} m, residual {:.2} px, clock offset {:+.1} ms, {} simulations",
             rope.params.length_m,
             rope.residual_px,
@@ -217,7 +217,7 @@ impl Run<'_> {
             other => bail!("the planner process answered with {other:?}"),
         };
         plan.unconfirmed.clone_from(&rope.unconfirmed);
-        self.record.stages.plan_s = stage.done(&describe(&plan));
+        self.record.stages.plan_s += stage.done(&describe(&plan));
         Ok(plan)
     }
 
@@ -251,7 +251,7 @@ impl Run<'_> {
     /// Moves to where the next motion starts so that the rope comes to rest: by a move planned with the
     /// identified rope and begun at the instant it was planned for. It is planned once the
     /// operator has confirmed it, and holds the control where there is one.
-    pub fn settle(&mut self, motions: Motions<'_>) -> anyhow::Result<()> {
+    pub fn settle(&mut self, motions: Motions<'_>, next: &str) -> anyhow::Result<()> {
         let asks = self.setup.asks;
         let [mut planning_s, longest_s] = if asks { ASKED_S } else { UNASKED_S };
         let (settled, stage) = loop {
@@ -272,10 +272,12 @@ impl Run<'_> {
         };
         let within_s = if asks { WATCHED_S } else { SETTLED_WITHIN_S };
         if !self.wait_still(&stage, within_s)? && asks {
-            self.warn("the rope still moves a little: see that it hangs still before THROW");
+            self.warn(&format!(
+                "the rope still moves a little: see that it hangs still before {next}"
+            ));
         }
         self.record.settle = Some(settled);
-        self.record.stages.settle_s = stage.done(&format!(
+        self.record.stages.settle_s += stage.done(&format!(
             "swing {:.1} cm -> {:.1} cm, as simulated",
             100.0 * settled.plain_residual_m,
             100.0 * settled.residual_m

@@ -37,8 +37,8 @@ const FAST_MOVE_S: f64 = 3.5;
 pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 /// The same after any other move, where the swing of whatever was before decays by itself (s).
 const DECAYED_WITHIN_S: f64 = 180.0;
-/// Oldest confirmation of a move at set-up speed.
-const CONFIRMED_WITHIN: Duration = Duration::from_secs(10);
+/// Longest wait for the rope after which a confirmed move is not confirmed again.
+const MOVE_FRESH: Duration = Duration::from_secs(10);
 /// What to do where the colours to look for are not known.
 pub const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
 /// How often the camera is asked for frames before the arm is enabled.
@@ -196,7 +196,11 @@ impl<'a> Run<'a> {
                 let mut rope = self.identify(&film, appearance)?;
                 let fits = rope.estimate().is_none_or(RopeEstimate::is_reliable);
                 if self.setup.short_wiggle.is_some() && !fits {
-                    self.record.warnings.truncate(told);
+                    let why = self.record.warnings.drain(told..).next();
+                    self.warn(&format!(
+                        "wiggled again, at length, and calmed before the throw, because the short film is not relied on: {}",
+                        why.unwrap_or_default()
+                    ));
                     let appearance;
                     (motion, film, appearance) =
                         self.tracked_at_length((&rope.params, &film, &motion))?;
@@ -206,7 +210,8 @@ impl<'a> Run<'a> {
                     (plan, Some(throw))
                 } else {
                     let plan = self.plan_from_rest(&rope)?;
-                    self.settle((&rope.params, &film, &motion, plan.trajectory.start()))?;
+                    let start_q = plan.trajectory.start();
+                    self.settle((&rope.params, &film, &motion, start_q), "THROW")?;
                     (plan, None)
                 }
             }
@@ -240,12 +245,14 @@ impl<'a> Run<'a> {
         &mut self,
         (rope, film, short): (&RopeParams, &Film, &JointTrajectory),
     ) -> anyhow::Result<(JointTrajectory, Film, RopeAppearance)> {
-        self.warn("wiggled again, at length, and calmed before the throw: no rope explains the film of the short wiggle well");
         self.setup.short_wiggle = None;
+        // Nothing goes on with it where the longer wiggle fails.
+        self.record.identified = None;
+        std::fs::remove_file(self.folder.file(files::ROPE))?;
         let motion = wiggle(&self.setup.settings.wiggle, &self.setup.limits)?;
         self.check_motion(&motion, OperatingMode::Wiggle)?;
         // What swing is left, because the rope is another one, the fit finds at the first frame.
-        self.settle((rope, film, short, motion.start()))?;
+        self.settle((rope, film, short, motion.start()), "WIGGLE")?;
         self.tracked_from_start(motion)
     }
 
@@ -302,11 +309,7 @@ impl<'a> Run<'a> {
     /// Enables the arm, moves to the start pose, waits for the rope.
     fn bring_up(&mut self, motion: &JointTrajectory) -> anyhow::Result<()> {
         if self.setup.short_wiggle.is_some() {
-            let took = self.await_stillness()?;
-            if self.setup.asks && took > CONFIRMED_WITHIN {
-                let what = "The arm will be enabled and move to the wiggle's start.";
-                self.session.confirm(what, "MOVE")?;
-            }
+            self.await_stillness()?;
         }
         let stage = Stage::begin("bring-up");
         let mut found = BringUp::default();
@@ -326,17 +329,25 @@ impl<'a> Run<'a> {
             ""
         };
         let done = format!("arm enabled{confirmation}, it stands at the start");
-        self.record.stages.bringup_s = stage.done(&done);
+        self.record.stages.bringup_s += stage.done(&done);
         Ok(())
     }
 
-    /// Waits for the rope; how long that took.
-    fn await_stillness(&mut self) -> anyhow::Result<Duration> {
-        let began = Instant::now();
-        let stage = Stage::begin("stillness");
-        let is_still = self.wait_or_warn(&stage)?;
-        stage.done(["the rope still swings", "the rope hangs still"][usize::from(is_still)]);
-        Ok(began.elapsed())
+    /// Waits for the rope before the arm is enabled. What was confirmed before a long wait is
+    /// confirmed again.
+    fn await_stillness(&mut self) -> anyhow::Result<()> {
+        loop {
+            let began = Instant::now();
+            let stage = Stage::begin("stillness");
+            let is_still = self.wait_or_warn(&stage)?;
+            let found = ["the rope still swings", "the rope hangs still"][usize::from(is_still)];
+            self.record.stages.bringup_s += stage.done(found);
+            if !self.setup.asks || began.elapsed() < MOVE_FRESH {
+                return Ok(());
+            }
+            let what = "The arm will be enabled and move to the wiggle's start.";
+            self.session.confirm(what, "MOVE")?;
+        }
     }
 
     /// Moves to the start of `motion` at set-up speed. Where the run is to be fast the rope hung
