@@ -8,6 +8,7 @@ mod full;
 mod kinds;
 mod rows;
 mod throwing;
+mod wiggling;
 
 pub(super) use full::run as run_full;
 
@@ -21,7 +22,8 @@ use experiments::trials::in_parallel;
 use rows::{TABLE, row, with_refusals};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use throwing::{Fate, Reality};
+use throwing::Fate;
+use wiggling::Reality;
 
 const ROPES: u64 = 20;
 /// Axis of the pictures.

@@ -1,38 +1,24 @@
 //! A rope in MuJoCo, filmed, identified and thrown at its target.
 
 use super::case::Case;
-use super::child::Mujoco;
+use super::wiggling::{Reality, Untold, WAITED_S, Wiggled};
 use crate::results::experiment::Experiment;
 use anyhow::{Context, anyhow, ensure};
-use arm_model::{Cell, JointTrajectory, Limits};
-use experiments::trials::{KEYPOINTS, alone};
+use arm_model::Cell;
 use nalgebra::Vector3;
-use planner::history::ArmHistory;
-use planner::identify::IdentifyOptions;
 use planner::plan::{
     MISS_STD_M, PlanError, PlanOptions, PlanRequest, PosteriorEnsemble, is_worth_swinging,
     plan_again, simulator_for, warnings,
 };
-use planner::synthetic::{FilmTiming, RopeFilm, SyntheticFilm, project};
-use planner::wiggle::wiggle;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::StandardNormal;
-use rope_sim::{FrameTimes, PlannedArm, Sway};
+use rope_sim::{FrameTimes, Sway};
 use serde::{Deserialize, Serialize};
-use shared_types::{ErrorForecast, Plan, RopeEstimate, RopeParams, Task};
+use shared_types::{ErrorForecast, Plan, RopeParams, Task};
 use std::array;
 use std::ops::ControlFlow;
 
-/// Time between kept positions of a film (s).
-const FILM_PERIOD_S: f64 = 1.0 / 240.0;
-/// Time between reports of the joints (s).
-const REPORT_PERIOD_S: f64 = 4e-3;
-/// The joint that wiggles (0-based).
-const WIGGLED: usize = 5;
-/// From a wiggle's end to the throw out of its swing (s): tracking, identification and planning of
-/// `wag run --fast` on two cores.
-const WAITED_S: f64 = 3.0;
 /// Time between positions of the tip in a throw (s); it moves straight in between.
 const THROW_PERIOD_S: f64 = 1e-3;
 
@@ -88,41 +74,6 @@ impl Fate {
     }
 }
 
-impl Wiggled {
-    /// How late the arm followed its setpoints (s), as `wag run` finds from the same.
-    fn lag_s(&self) -> f64 {
-        let differs = |lag_s: f64| {
-            let times_s = (0..).map(|i| f64::from(i) * REPORT_PERIOD_S);
-            let within = times_s.take_while(|t| *t <= self.command.duration_s());
-            let way = |t: f64| self.reported.state_at(t + lag_s).q - self.command.state_at(t).q;
-            within.map(|t| way(t)[WIGGLED].powi(2)).sum::<f64>()
-        };
-        let lags_s = (0..100).map(|i| f64::from(i) * 2e-3);
-        let least = lags_s.min_by(|a, b| differs(*a).total_cmp(&differs(*b)));
-        least.unwrap_or_default()
-    }
-}
-
-/// Films and throws in MuJoCo; identifies and plans with the product's own equations.
-pub(super) struct Reality<'a> {
-    pub experiment: &'a Experiment<'a>,
-    pub mujoco: Mujoco,
-    /// Ropes of the posterior that a first throw is planned for.
-    pub robust: usize,
-    /// Whether throws begin out of the swing of a short wiggle, where that is worth it.
-    pub fast: bool,
-}
-
-/// What was filmed, and what its joints reported.
-struct Wiggled {
-    command: JointTrajectory,
-    reported: JointTrajectory,
-    /// How the rope swung at its begin, as identified.
-    sway: Sway,
-    /// Whether it was short, and a throw may begin out of its swing.
-    short: bool,
-}
-
 impl Reality<'_> {
     /// Trial `index`: filmed, identified, planned for and thrown; then thrown again until there
     /// are `N` throws, each corrected by the miss of the one before. What follows a refusal is
@@ -131,27 +82,12 @@ impl Reality<'_> {
     /// # Errors
     /// MuJoCo fails. What identification or planning refuses is a fate.
     pub fn identified<const N: usize>(&self, index: u64, case: &Case) -> anyhow::Result<[Fate; N]> {
-        let mut short = self.fast;
-        let (wiggled, found) = loop {
-            // The fit hears what the joints report; the arm is where it is.
-            let command = self.wiggle(case, short)?;
-            let reported = case.arm.reported(&command)?;
-            let filmed = self.film(case, &reported)?;
-            let found = match self.identify(index, &filmed, &reported) {
-                Ok(found) => found,
-                Err(refusal) => return Ok(array::from_fn(|_| Fate::refused(&refusal))),
-            };
-            if found.is_reliable() || !short {
-                let sway = found.circumstances.sway;
-                let wiggled = Wiggled {
-                    command,
-                    reported,
-                    sway,
-                    short,
-                };
-                break (wiggled, found);
+        let (wiggled, found) = match self.told(index, case) {
+            Ok(told) => told,
+            Err(Untold::Refused(refusal)) => {
+                return Ok(array::from_fn(|_| Fate::refused(&refusal)));
             }
-            short = false;
+            Err(Untold::Failed(why)) => return Err(why),
         };
         let (rope, posterior) = (&found.params, &found.posterior);
         let seed = self.experiment.args.seed ^ index;
@@ -169,16 +105,6 @@ impl Reality<'_> {
             flagged: found.out_of_distribution.is_flagged(),
         };
         self.thrown(index, case, (rope, ensemble), Some((fit, &wiggled)))
-    }
-
-    /// As `wag run` wiggles.
-    fn wiggle(&self, case: &Case, short: bool) -> anyhow::Result<JointTrajectory> {
-        if !short {
-            return Ok(*self.experiment.rig.motion.trajectory());
-        }
-        let config = &self.experiment.config;
-        let short = config.short_wiggle(Task::Strike, case.target_m)?;
-        Ok(wiggle(&short, &Limits::default())?)
     }
 
     /// Trial `index`: planned for `rope`, whichever it is, and thrown with the case's.
@@ -231,49 +157,6 @@ impl Reality<'_> {
         fates
             .try_into()
             .map_err(|fates: Vec<Fate>| anyhow!("{} throws instead of {N}", fates.len()))
-    }
-
-    fn film(&self, case: &Case, reported: &JointTrajectory) -> anyhow::Result<SyntheticFilm> {
-        let timing = timing_of(reported);
-        let times = FrameTimes {
-            first_s: 0.0,
-            period_s: FILM_PERIOD_S,
-            count: ((timing.duration_s() + 0.05) / FILM_PERIOD_S).ceil() as usize,
-        };
-        let motion = |t_s| case.arm.attach_frame(reported, t_s);
-        let points = self
-            .mujoco
-            .simulate(&case.rope, motion, case.seed, &times, KEYPOINTS)?;
-        let positions_m = points.iter().flat_map(|p| p.cast::<f32>().data.0[0]);
-        let params = case.rope.params;
-        let film =
-            RopeFilm::from_positions(params, FILM_PERIOD_S, KEYPOINTS, positions_m.collect())
-                .context("a film without frames")?;
-        let camera = &self.experiment.rig.camera;
-        Ok(project(&film, camera, &timing, &case.film))
-    }
-
-    /// As `wag identify` does, with the experiment's method.
-    fn identify(
-        &self,
-        index: u64,
-        filmed: &SyntheticFilm,
-        reported: &JointTrajectory,
-    ) -> anyhow::Result<RopeEstimate> {
-        let Experiment { rig, options, .. } = self.experiment;
-        let motion = PlannedArm::new(*reported, Cell::default().pole);
-        let observation = planner::observation::Observation {
-            motion: &motion,
-            ..rig.observation(filmed)
-        };
-        let options = IdentifyOptions {
-            seed: options.seed ^ index,
-            ..alone(options)
-        };
-        let network = rig.network.as_deref();
-        let go_on = &mut |_| ControlFlow::Continue(());
-        let found = planner::identify(&observation, &options, network, go_on);
-        found.context("identification")
     }
 
     /// As `wag plan strike` does by default.
@@ -345,17 +228,6 @@ impl Reality<'_> {
     }
 }
 
-/// Frames of a motion's film: the paper's 400 at most.
-fn timing_of(motion: &JointTrajectory) -> FilmTiming {
-    let usual = FilmTiming::default();
-    FilmTiming {
-        frames: usual
-            .frames
-            .min((usual.rate_hz * motion.duration_s()) as usize),
-        ..usual
-    }
-}
-
 /// The plan of a throw: out of the swing that a wiggle left, where there was one and that is
 /// worth it.
 fn planned(request: &PlanRequest, wiggled: Option<&Wiggled>) -> Result<Plan, PlanError> {
@@ -363,19 +235,8 @@ fn planned(request: &PlanRequest, wiggled: Option<&Wiggled>) -> Result<Plan, Pla
     let Some(wiggled) = wiggled else {
         return plan(request);
     };
-    let reported = &wiggled.reported;
-    let times_s = (0..).map(|i| f64::from(i) * REPORT_PERIOD_S);
-    let times_s: Vec<f64> = times_s
-        .take_while(|t| *t <= reported.duration_s())
-        .collect();
     let swinging = plan(&PlanRequest {
-        before: Some(ArmHistory {
-            sway: wiggled.sway,
-            q: times_s.iter().map(|t| reported.state_at(*t).q).collect(),
-            times_s,
-            start_s: wiggled.command.duration_s() + WAITED_S + wiggled.lag_s(),
-            start_q: wiggled.command.end(),
-        }),
+        before: Some(wiggled.history(WAITED_S)),
         ..request.clone()
     })?;
     let mut calm = None;

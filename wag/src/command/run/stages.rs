@@ -39,6 +39,8 @@ pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 const DECAYED_WITHIN_S: f64 = 180.0;
 /// Longest wait for the rope after which a confirmed move is not confirmed again.
 const MOVE_FRESH: Duration = Duration::from_secs(10);
+/// The same after a move that was planned with a rope that is not relied on (s).
+const DAMPED_WITHIN_S: f64 = 30.0;
 /// What to do where the colours to look for are not known.
 pub const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
 /// How often the camera is asked for frames before the arm is enabled.
@@ -251,8 +253,11 @@ impl<'a> Run<'a> {
         std::fs::remove_file(self.folder.file(files::ROPE))?;
         let motion = wiggle(&self.setup.settings.wiggle, &self.setup.limits)?;
         self.check_motion(&motion, OperatingMode::Wiggle)?;
-        // What swing is left, because the rope is another one, the fit finds at the first frame.
         self.settle((rope, film, short, motion.start()), "WIGGLE")?;
+        // The rope is another one, so that it still swings; the fit finds what is left.
+        let stage = Stage::begin("stillness");
+        let is_still = self.wait_still(&stage, DAMPED_WITHIN_S)?;
+        self.record.stages.settle_s += stage.done(swings(is_still));
         self.tracked_from_start(motion)
     }
 
@@ -340,8 +345,7 @@ impl<'a> Run<'a> {
             let began = Instant::now();
             let stage = Stage::begin("stillness");
             let is_still = self.wait_or_warn(&stage)?;
-            let found = ["the rope still swings", "the rope hangs still"][usize::from(is_still)];
-            self.record.stages.bringup_s += stage.done(found);
+            self.record.stages.bringup_s += stage.done(swings(is_still));
             if !self.setup.asks || began.elapsed() < MOVE_FRESH {
                 return Ok(());
             }
@@ -372,6 +376,14 @@ impl<'a> Run<'a> {
             ));
         }
         Ok(is_still)
+    }
+}
+
+const fn swings(is_still: bool) -> &'static str {
+    if is_still {
+        "the rope hangs still"
+    } else {
+        "the rope still swings"
     }
 }
 
