@@ -113,8 +113,14 @@ fn a_rope_that_the_short_wiggle_does_not_tell_is_wiggled_at_length() {
     let _turn = alone();
     let (_rig, arm, _) = filmed("again");
     let folder = tempfile::tempdir().unwrap();
-    let line = format!("run --fast {arm} --seed 4 --length 0.44");
-    let done = moved_in(folder.path(), &line, "run");
+    let run = folder.path().join("run");
+    let line = format!(
+        "run --fast {arm} --seed 4 --length 0.44 --ask --yes --operator Ada --out {}",
+        run.display()
+    );
+    let words = confirmed(&line);
+    assert_eq!(words, ["WIGGLE", "MOVE", "WIGGLE", "MOVE", "THROW"]);
+    let done: Value = files::read_json(&run.join(files::SUMMARY)).unwrap();
     has(
         done["warnings"][0].as_str().unwrap(),
         &["wiggled again, at length"],
@@ -124,6 +130,6 @@ fn a_rope_that_the_short_wiggle_does_not_tell_is_wiggled_at_length() {
         done["settle"].is_object() && done["throw_late_s"].is_null(),
         "{done:#}"
     );
-    let plan = files::read_plan(&folder.path().join("run/plan.json")).unwrap();
+    let plan = files::read_plan(&run.join(files::PLAN)).unwrap();
     assert_eq!(plan.start, None);
 }

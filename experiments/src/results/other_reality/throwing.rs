@@ -1,7 +1,7 @@
 //! A rope in MuJoCo, filmed, identified and thrown at its target.
 
 use super::case::Case;
-use super::wiggling::{Reality, Untold, WAITED_S, Wiggled};
+use super::wiggling::{Reality, Untold, Wiggled};
 use crate::results::experiment::Experiment;
 use anyhow::{Context, anyhow, ensure};
 use arm_model::Cell;
@@ -204,7 +204,7 @@ impl Reality<'_> {
         let mut rope = case.rope;
         let swings = wiggled.filter(|_| planned.start.is_some());
         let ends = if let Some(wiggled) = swings {
-            times.first_s = wiggled.command.duration_s() + WAITED_S;
+            times.first_s = wiggled.throw_begins_s();
             let motion = |t_s: f64| {
                 let since_s = t_s - times.first_s;
                 let (made, at_s) = if since_s < 0.0 {
@@ -236,7 +236,7 @@ fn planned(request: &PlanRequest, wiggled: Option<&Wiggled>) -> Result<Plan, Pla
         return plan(request);
     };
     let swinging = plan(&PlanRequest {
-        before: Some(wiggled.history(WAITED_S)),
+        before: Some(wiggled.history()),
         ..request.clone()
     })?;
     let mut calm = None;

@@ -8,7 +8,6 @@ use arm_model::{Cell, JointTrajectory, Limits};
 use experiments::trials::{KEYPOINTS, alone};
 use planner::history::ArmHistory;
 use planner::identify::IdentifyOptions;
-use planner::settle::SettleRequest;
 use planner::synthetic::{FilmNoise, FilmTiming, RopeFilm, SyntheticFilm, project};
 use planner::wiggle::wiggle;
 use rope_sim::{FrameTimes, PlannedArm, Sway};
@@ -23,11 +22,7 @@ const REPORT_PERIOD_S: f64 = 4e-3;
 const WIGGLED: usize = 5;
 /// From a wiggle's end to the throw out of its swing (s): tracking, identification and planning of
 /// `wag run --fast` on two cores.
-pub(super) const WAITED_S: f64 = 3.0;
-/// From the end of a short wiggle that is not relied on to the move that damps its swing (s), and
-/// from that one's end to the usual wiggle: as `wag run --fast` waits at most.
-const SETTLING_S: f64 = WAITED_S + 2.0;
-const SETTLED_S: f64 = 30.0;
+const WAITED_S: f64 = 3.0;
 
 /// Films and throws in MuJoCo; identifies and plans with the product's own equations.
 pub(super) struct Reality<'a> {
@@ -71,8 +66,13 @@ impl Wiggled {
         least.unwrap_or_default()
     }
 
-    /// What the arm did until it moves again, `waited_s` after the wiggle's end.
-    pub fn history(&self, waited_s: f64) -> ArmHistory {
+    /// When a throw out of its swing is commanded to begin (s).
+    pub fn throw_begins_s(&self) -> f64 {
+        self.command.duration_s() + WAITED_S
+    }
+
+    /// What the arm did until a throw out of the swing begins.
+    pub fn history(&self) -> ArmHistory {
         let times_s = (0..).map(|i| f64::from(i) * REPORT_PERIOD_S);
         let times_s = times_s.take_while(|t| *t <= self.reported.duration_s());
         let (times_s, q) = times_s.map(|t| (t, self.reported.state_at(t).q)).unzip();
@@ -80,61 +80,41 @@ impl Wiggled {
             sway: self.sway,
             times_s,
             q,
-            start_s: self.command.duration_s() + waited_s + self.lag_s(),
+            start_s: self.throw_begins_s() + self.lag_s(),
             start_q: self.command.end(),
         }
     }
 }
-
-/// Motions as the joints report them, each with its begin (s), in order; the arm rests in between.
-type Motions = [(f64, JointTrajectory)];
 
 impl Reality<'_> {
     /// Trial `index` wiggled as `wag run` does: the rope as identified, and the wiggle that told it.
     pub(super) fn told(&self, index: u64, case: &Case) -> Result<(Wiggled, RopeEstimate), Untold> {
         let usual = *self.experiment.rig.motion.trajectory();
         if !self.fast {
-            return self.told_by(index, case, &[], (usual, false));
+            return self.told_by(index, case, 0, (usual, false));
         }
         let wiggled = self.short_wiggle(case).map_err(Untold::Failed)?;
-        let (wiggled, found) = self.told_by(index, case, &[], (wiggled, true))?;
+        let (wiggled, found) = self.told_by(index, case, 0, (wiggled, true))?;
         if found.is_reliable() {
             return Ok((wiggled, found));
         }
-        // The swing is damped with the rope that was found.
-        let damped = planner::settle(
-            &SettleRequest {
-                rope: found.params,
-                before: wiggled.history(SETTLING_S),
-                end_q: usual.start(),
-                limits: Limits::default(),
-                cell: Cell::default(),
-                config: self.experiment.config.settle.clone(),
-            },
-            &mut |_| ControlFlow::Continue(()),
-        );
-        let damped = damped
-            .map_err(|why| Untold::Refused(why.into()))?
-            .trajectory;
-        let settling_s = wiggled.command.duration_s() + SETTLING_S;
-        let reported = case.arm.reported(&damped);
-        let reported = reported.map_err(|why| Untold::Failed(why.into()))?;
-        let before = [(0.0, wiggled.reported), (settling_s, reported)];
-        self.told_by(index, case, &before, (usual, false))
+        // The swing is damped, and what is left awaited, as before any wiggle: the film begins with
+        // the sway that every film begins with.
+        self.told_by(index, case, 1, (usual, false))
     }
 
-    /// A wiggle that follows `before`, filmed, and what identification makes of it.
+    /// A wiggle in film `number`, and what identification makes of it.
     fn told_by(
         &self,
         index: u64,
         case: &Case,
-        before: &Motions,
+        number: u64,
         (command, short): (JointTrajectory, bool),
     ) -> Result<(Wiggled, RopeEstimate), Untold> {
         // The fit hears what the joints report; the arm is where it is.
         let reported = case.arm.reported(&command);
         let reported = reported.map_err(|why| Untold::Failed(why.into()))?;
-        let filmed = self.film(case, before, &reported).map_err(Untold::Failed)?;
+        let filmed = self.film(case, number, &reported).map_err(Untold::Failed)?;
         let found = self.identify(index, &filmed, &reported);
         let found = found.map_err(Untold::Refused)?;
         let wiggled = Wiggled {
@@ -155,23 +135,16 @@ impl Reality<'_> {
     fn film(
         &self,
         case: &Case,
-        before: &Motions,
+        number: u64,
         reported: &JointTrajectory,
     ) -> anyhow::Result<SyntheticFilm> {
-        let last = before.last();
-        let begin_s = last.map_or(0.0, |(s, made)| s + made.duration_s() + SETTLED_S);
         let timing = timing_of(reported);
         let times = FrameTimes {
-            first_s: begin_s,
+            first_s: 0.0,
             period_s: FILM_PERIOD_S,
             count: ((timing.duration_s() + 0.05) / FILM_PERIOD_S).ceil() as usize,
         };
-        let wiggle = (begin_s, *reported);
-        let motion = |t_s: f64| {
-            let made = before.iter().chain([&wiggle]).rfind(|(s, _)| *s <= t_s);
-            let (s, made) = made.unwrap_or(&wiggle);
-            case.arm.attach_frame(made, t_s - s)
-        };
+        let motion = |t_s| case.arm.attach_frame(reported, t_s);
         let points = self
             .mujoco
             .simulate(&case.rope, motion, case.seed, &times, KEYPOINTS)?;
@@ -182,7 +155,7 @@ impl Reality<'_> {
                 .context("a film without frames")?;
         let camera = &self.experiment.rig.camera;
         let noise = FilmNoise {
-            seed: case.film.seed.wrapping_add(before.len() as u64),
+            seed: case.film.seed.wrapping_add(number),
             ..case.film
         };
         Ok(project(&film, camera, &timing, &noise))

@@ -39,8 +39,6 @@ pub(super) const SETTLED_WITHIN_S: f64 = 3.0;
 const DECAYED_WITHIN_S: f64 = 180.0;
 /// Longest wait for the rope after which a confirmed move is not confirmed again.
 const MOVE_FRESH: Duration = Duration::from_secs(10);
-/// The same after a move that was planned with a rope that is not relied on (s).
-const DAMPED_WITHIN_S: f64 = 30.0;
 /// What to do where the colours to look for are not known.
 pub const UNNAMED_COLOURS: &str = "name the colour of the target with --target-rgb, and without a wiggle the tip's with --tip-rgb";
 /// How often the camera is asked for frames before the arm is enabled.
@@ -254,9 +252,9 @@ impl<'a> Run<'a> {
         let motion = wiggle(&self.setup.settings.wiggle, &self.setup.limits)?;
         self.check_motion(&motion, OperatingMode::Wiggle)?;
         self.settle((rope, film, short, motion.start()), "WIGGLE")?;
-        // The rope is another one, so that it still swings; the fit finds what is left.
+        // The rope is another one than that was planned with, so that it still swings.
         let stage = Stage::begin("stillness");
-        let is_still = self.wait_still(&stage, DAMPED_WITHIN_S)?;
+        let is_still = self.wait_or_warn(&stage)?;
         self.record.stages.settle_s += stage.done(swings(is_still));
         self.tracked_from_start(motion)
     }
