@@ -4,7 +4,9 @@ use super::answers::{ControllerCall, answer, refuse};
 use super::{Awaited, Bridge, Open, REPORT_WAIT, SET_UP_TIMEOUT};
 use crate::commander::CommanderLock;
 use crate::config::ControllerConfig;
+use crate::control::monitor::SETTLE_NS;
 use crate::control::{ControlCommand, Motion};
+use crate::os::now_ns;
 use crate::point_to_point::{plan_move, verify};
 use crate::session::{ArmSession, SessionError};
 use crate::set_up::{SetUp, SetUpError};
@@ -148,6 +150,31 @@ impl Bridge {
                 self.pass_on(call, ControlCommand::Engage { hold }, Some(link), awaits);
             }
             Err((fault, detail)) => refuse(&call, fault, &detail),
+        }
+    }
+
+    /// Answers bring-ups whose arm is held and reports its joints.
+    pub(super) fn settle_engagements(&mut self) {
+        let stale_ns = self.settings.thresholds.report_stale_ns;
+        // Before, a report says nothing of the mode that the arm was brought into.
+        let counts_ns = self.at_rest_ns.saturating_add(SETTLE_NS);
+        let fresh = self.newest_report.is_some_and(|r| {
+            r.arrival_ns > counts_ns && now_ns().saturating_sub(r.arrival_ns) < stale_ns
+        });
+        let held = |a: &Awaited| matches!(a, Awaited::Engaged { held: true, .. });
+        let guarded = self.guarded || !self.config.guardian.required;
+        for open in self.take(|awaits| held(awaits) && fresh && guarded) {
+            answer(&open.call, &ControllerEvent::Done);
+        }
+        let now = Instant::now();
+        let late = |a: &Awaited| matches!(a, Awaited::Engaged { until, .. } if now > *until);
+        for open in self.take(late) {
+            let fault = if fresh {
+                FaultCode::GuardianLost
+            } else {
+                FaultCode::ReportStale
+            };
+            refuse(&open.call, fault, "");
         }
     }
 

@@ -4,13 +4,14 @@
 use super::support::{Rig, alone, command, ended, has, heard, moved_in, refused_in, said, wag_in};
 use run_log::files;
 use serde_json::{Value, json};
+use std::fs;
 use std::io::Write;
 use std::process::Stdio;
 
 /// A rig that films, its arm and camera as arguments, and the camera's domain.
-fn filmed(name: &str) -> (Rig, String, String) {
+fn filmed(name: &str, rope: &str) -> (Rig, String, String) {
     let domain = format!("{name}{}", std::process::id());
-    let rig = Rig::start(&format!("--rope random --seed 4 --camera {domain}"));
+    let rig = Rig::start(&format!("--rope {rope} --seed 4 --camera {domain}"));
     let [port, joints, _, rich, _] = rig.ports();
     let arm = format!(
         "--arm 127.0.0.1 --command-port {port} --report-port {joints} --status-port {rich} --camera {domain}"
@@ -23,7 +24,7 @@ fn filmed(name: &str) -> (Rig, String, String) {
 #[test]
 fn a_strike_out_of_the_swing_is_thrown_at_its_instant_and_at_no_other() {
     let _turn = alone();
-    let (_rig, arm, domain) = filmed("fast");
+    let (_rig, arm, domain) = filmed("fast", "random");
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let done = moved_in(here, &format!("run --fast {arm} --seed 4"), "fast");
@@ -86,7 +87,7 @@ fn confirmed(line: &str) -> Vec<String> {
 #[test]
 fn a_strike_out_of_the_swing_is_confirmed_where_it_begins() {
     let _turn = alone();
-    let (_rig, arm, _) = filmed("asked");
+    let (_rig, arm, _) = filmed("asked", "random");
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
     let line = format!(
@@ -111,11 +112,16 @@ fn a_strike_out_of_the_swing_is_confirmed_where_it_begins() {
 #[test]
 fn a_rope_that_the_short_wiggle_does_not_tell_is_wiggled_at_length() {
     let _turn = alone();
-    let (_rig, arm, _) = filmed("again");
     let folder = tempfile::tempdir().unwrap();
+    // Its swing decays within seconds.
+    let rope = folder.path().join("rope.toml");
+    let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/rope/example.toml");
+    let example = fs::read_to_string(example).unwrap();
+    fs::write(&rope, example.replace("0.00707", "0.04")).unwrap();
+    let (_rig, arm, _) = filmed("again", &rope.display().to_string());
     let run = folder.path().join("run");
     let line = format!(
-        "run --fast {arm} --seed 4 --length 0.44 --ask --yes --operator Ada --out {}",
+        "run --fast {arm} --seed 4 --length 0.42 --ask --yes --operator Ada --out {}",
         run.display()
     );
     let words = confirmed(&line);
