@@ -25,8 +25,7 @@ pub type ArmLink = RpcClient<ControllerRpc>;
 #[error("the controller refused {what} ({fault:?}): {message}")]
 pub struct Refused {
     what: String,
-    /// Why.
-    pub fault: FaultCode,
+    fault: FaultCode,
     message: String,
 }
 
